@@ -41,13 +41,13 @@ class Delivery:
         time: when the receiver was notified [s].
         before, after: its outputs before and after, shape (q,); None where it could not be stopped there.
         outcome: what became of it: ``accepted``, ``replayed``, ``late``, ``rejected``, ``doubted`` (and used),
-            ``ignored``, or ``told`` where that is not known.
+            ``ignored``, or ``notified`` where that is not known.
     """
 
     time: float
     before: np.ndarray | None = None
     after: np.ndarray | None = None
-    outcome: str = "told"
+    outcome: str = "notified"
     _logged: tuple[dict[str, str], str] | None = None
 
     def logged_in(self, outcomes: dict[str, str], receiver: str) -> None:
@@ -226,13 +226,13 @@ class Receiver:
 
     def _announce(self, now: float, notified_at: float, telegram: _Deliverable) -> Delivery:
         """FMI 2: the event happens at the end of the step from `now` to `notified_at` [s]."""
-        delivery = Delivery(notified_at, self._look_ahead(now, notified_at))
+        delivery = Delivery(notified_at, self._step_ahead(now, notified_at))
         self._notify(now, telegram, min(telegram.stamp, notified_at), delivery)
         self._advance(now, notified_at)
         delivery.after = self._outputs()
         return delivery
 
-    def _look_ahead(self, now: float, notified_at: float) -> np.ndarray | None:
+    def _step_ahead(self, now: float, notified_at: float) -> np.ndarray | None:
         """Outputs at `notified_at` [s] without the event, where going there and back is known to leave no trace."""
         component = self.planned.component
         if not component.restores_exactly:

@@ -66,16 +66,16 @@ class Call:
             CosimError: tolerances, names or the run itself are not as they should be.
         """
         ignored = tuple(ignore)
-        given = tolerance is not None or tolerances or ignored
+        stated = tolerance is not None or tolerances or ignored
         # before the run: it may be long
-        wanted = _tolerances_of(Tolerances(), tolerance, tolerances, ignored) if given else None
+        wanted = _tolerances_of(Tolerances(), tolerance, tolerances, ignored) if stated else None
         chosen = None if signals is None else tuple(signals)
         with after_its_delivery(path, what, folder):
             subject = make_subject(what, folder, **arguments)
         return cls(subject, path, wanted, chosen, every)
 
     @property
-    def _given(self) -> Any:
+    def _stated(self) -> Any:
         return self.subject.outcome or self.subject.result
 
     def check(self) -> Regression:
@@ -85,12 +85,12 @@ class Call:
             BaselineError: it is missing, unreadable or of another model. ComparisonError: nothing can be compared.
         """
         self._demand_either()
-        return check(self._given, read_baseline(self.path), self.tolerances)
+        return check(self._stated, read_baseline(self.path), self.tolerances)
 
     def update(self) -> Update:
         """What updating the baseline would do."""
         return plan_update(
-            self._given, self.path, self.tolerances, recipe=self.subject.recipe, signals=self.signals, every=self.every
+            self._stated, self.path, self.tolerances, recipe=self.subject.recipe, signals=self.signals, every=self.every
         )
 
     def without_baseline(self) -> Regression:
@@ -132,9 +132,9 @@ def _tolerances_of(
 ) -> Tolerances:
     """Tolerances as a test gives them, on top of others."""
     default = Tolerances.of(tolerance).default if tolerance is not None else base.default
-    given = Tolerances.of(default, by_signal, ignore)
+    stated = Tolerances.of(default, by_signal, ignore)
     merged: dict[str, Tolerance] = {
-        **given.by_signal,
-        **{k: v for k, v in base.by_signal.items() if k not in given.by_signal},
+        **stated.by_signal,
+        **{k: v for k, v in base.by_signal.items() if k not in stated.by_signal},
     }
-    return Tolerances(default, merged, (*base.ignore, *(name for name in given.ignore if name not in base.ignore)))
+    return Tolerances(default, merged, (*base.ignore, *(name for name in stated.ignore if name not in base.ignore)))

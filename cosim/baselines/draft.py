@@ -103,8 +103,8 @@ def _kept_rows(result: Result, every: float | None) -> np.ndarray:
     if every is None and len(time) <= _ROWS:
         every = 0.0
     keep = np.ones(len(time), bool) if every == 0.0 or len(time) < 3 else _spaced(time, every)
-    same = np.flatnonzero(np.diff(time) == 0.0)
-    for rows in (same, same + 1, *_changes(result)):
+    equal = np.flatnonzero(np.diff(time) == 0.0)
+    for rows in (equal, equal + 1, *_changes(result)):
         keep[rows] = True
     keep[[0, -1]] = True
     return np.flatnonzero(keep)
@@ -168,11 +168,11 @@ def time_text(times: list[float], decimals: int | None) -> list[str]:
     for row in range(1, len(times)):
         if times[row] != times[row - 1] and not float(texts[row]) > float(texts[row - 1]):
             for near in (row - 1, row):
-                texts[near] = _same_instant(times, texts, near)
+                texts[near] = _equal_instant(times, texts, near)
     return texts
 
 
-def _same_instant(times: list[float], texts: list[str], row: int) -> str:
+def _equal_instant(times: list[float], texts: list[str], row: int) -> str:
     """The full text of a row's time, given to the rows with the same time as well."""
     full = number_text(times[row], None)
     first = row
@@ -252,7 +252,7 @@ def resolved(tolerances: Tolerances, names: Sequence[str]) -> Tolerances:
         tolerances: what is allowed, signal by signal.
         names: of the signals.
     """
-    by_signal = {resolve(pattern, names): given for pattern, given in tolerances.by_signal.items()}
+    by_signal = {resolve(pattern, names): stated for pattern, stated in tolerances.by_signal.items()}
     return replace(
         tolerances, by_signal=by_signal, ignore=tuple(resolve(pattern, names) for pattern in tolerances.ignore)
     )

@@ -55,7 +55,7 @@ def check(
     outcome = result if isinstance(result, Outcome) else None
     actual = result if isinstance(result, Result) else result.result
     pairs = same_models(baseline.header.components, identities(actual))
-    _demand_same_models(pairs, baseline)
+    _demand_equal_models(pairs, baseline)
     if not len(actual.table):
         raise ComparisonError(f"The run is empty: it has no rows to compare with {baseline.label}.")
     names = [info.name for info in (*baseline.result.signals, *actual.signals)]
@@ -80,11 +80,11 @@ def regression(
         actual: what was compared with the baseline.
         baseline: what it was held against; None where it was made now.
     """
-    given: dict[str, Any] = {entry.name: getattr(comparison, entry.name) for entry in fields(Comparison)}
-    return Regression(**given, outcome=outcome, actual=actual, baseline=baseline)
+    stated: dict[str, Any] = {entry.name: getattr(comparison, entry.name) for entry in fields(Comparison)}
+    return Regression(**stated, outcome=outcome, actual=actual, baseline=baseline)
 
 
-def _demand_same_models(pairs: Sequence[Pair], baseline: Baseline) -> None:
+def _demand_equal_models(pairs: Sequence[Pair], baseline: Baseline) -> None:
     """Refuse a result of another model; the same model with another GUID is a new delivery.
 
     Raises:

@@ -102,9 +102,11 @@ def _former(path: Path) -> tuple[Baseline | None, list[str]]:
 
 def _may_stay(before: Comparison, former: Baseline, draft: BaselineDraft) -> bool:
     """Whether the former rows still show what the new ones would."""
-    same = all(getattr(former.header, key) == getattr(draft.header, key) for key in ("tolerances", "every", "span"))
+    unchanged = all(
+        getattr(former.header, key) == getattr(draft.header, key) for key in ("tolerances", "every", "span")
+    )
     names = [info.name for info in former.header.signals] == [info.name for info in draft.header.signals]
-    return same and names and before.equal and not former.notes
+    return unchanged and names and before.equal and not former.notes
 
 
 def _text(path: Path, suffix: str) -> str:

@@ -111,12 +111,12 @@ def _sampled(recording: Result, columns: Mapping[str, str], rows: _Rows) -> dict
 
 
 def _driving(
-    columns: Sequence[str], source: str, inputs: Sequence[str], given: Mapping[str, str | float]
+    columns: Sequence[str], source: str, inputs: Sequence[str], stated: Mapping[str, str | float]
 ) -> tuple[dict[str, str], dict[str, float]]:
     """Columns and constants that drive inputs, by name."""
     driving = {name: column for name in inputs if (column := _column(name, columns)) is not None}
     constants = dict[str, float]()
-    for name, what in given.items():
+    for name, what in stated.items():
         if name not in inputs:
             raise CalibrationError(f"The model has no input {name!r}; {nearest(name, inputs)}")
         if isinstance(what, str):

@@ -10,7 +10,7 @@ from cosim.certify.demands import Certified, Demands, certified
 from cosim.run.balise_service import balise_roles
 from cosim.run.checked_observers import gaps_to_expect
 from cosim.run.checked_tables import Stated
-from cosim.run.component_models import given_parameters, make_system
+from cosim.run.component_models import make_system, stated_parameters
 from cosim.run.connections import parse_connections
 from cosim.run.coupled import couple
 from cosim.run.described_components import describe_component
@@ -57,7 +57,7 @@ def _of_observer(
 ) -> Certified:
     gap = expected if demands.gap is None else ExpectedGap(demands.gap, "asked for")
     found, warnings = evaluated(name, table, system, gap)
-    in_use = given_parameters(table, system), table.preset
+    in_use = stated_parameters(table, system), table.preset
     further = certified(name, system, replace(demands, gap=None if found else demands.gap), *in_use)
     first = further.findings[0] if found is None else found
     of_gap = () if found is None or found.demand is None else (found,)

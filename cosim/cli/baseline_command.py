@@ -100,8 +100,8 @@ def _make(options: argparse.Namespace) -> Output:
     path = _free(baseline_path(options.file), options.force)
     tolerances = chosen_tolerances(options, asked_tolerances(options), Tolerances())
     subject = _subject(options)
-    given = subject.outcome or subject.result
-    update = plan_update(given, path, tolerances, recipe=subject.recipe, signals=options.signals, every=options.every)
+    stated = subject.outcome or subject.result
+    update = plan_update(stated, path, tolerances, recipe=subject.recipe, signals=options.signals, every=options.every)
     return _written(update, path)
 
 

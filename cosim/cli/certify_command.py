@@ -13,7 +13,7 @@ from cosim.cli.arguments import settings_argument
 from cosim.cli.model_info import declared_model, in_own_words
 from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import CosimError
-from cosim.run.component_models import given_parameters, make_declared
+from cosim.run.component_models import make_declared, stated_parameters
 from cosim.run.run_seeds import with_seeds
 from cosim.run.task import RunTask
 from cosim.scenario.scenario_tables import ComponentTable
@@ -106,7 +106,7 @@ def _gains_file(what: str) -> ComponentTable | None:
 
 def _of_gains(table: ComponentTable, options: argparse.Namespace, demands: Demands) -> Certified:
     made: Any = make_declared(table, options.what)
-    parameters = given_parameters(table, made) | dict(map(parse_setting, options.settings))
+    parameters = stated_parameters(table, made) | dict(map(parse_setting, options.settings))
     return _certified(str(table.observer), made, parameters, options.preset or table.preset, options, demands)
 
 

@@ -23,10 +23,10 @@ from cosim.evaluation.error_table import error_table
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.fault_table import fault_table
 from cosim.evaluation.metrics import phase_metrics
-from cosim.expectations.judged import judged_table
+from cosim.expectations.evaluated import evaluated_table
 from cosim.process.last_call import LAST_CALL
 from cosim.results.results_folder import check_writable
-from cosim.results.unfinished import SPARE
+from cosim.results.unfinished import UNFINISHED
 from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
 from fmus.cli.commands import argument
@@ -130,7 +130,7 @@ class _Results:
         self.outcome = outcome.asked_by(self.options.command_line)
         self.paths = _written(self.outcome, self.directory, self.options)
         LAST_CALL.note(json.dumps({"written": str(self.directory)}))
-        shutil.rmtree(self.directory / SPARE, ignore_errors=True)
+        shutil.rmtree(self.directory / UNFINISHED, ignore_errors=True)
 
 
 def _written(outcome: Outcome, directory: Path, options: argparse.Namespace) -> dict[str, Path]:
@@ -143,14 +143,14 @@ def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, cal
     directory = results.directory
     bar = simulated_time_bar(silent=options.quiet or options.json)
     try:
-        with _kept(directory, options.stream, scenario.table().report.tables) as spare:
+        with _kept(directory, options.stream, scenario.table().report.tables) as fallback:
             scenario.run(
                 progress=bar,
                 warn=print_warning,
                 call_log=call_log,
                 building=ignore if options.quiet else print_notice,
                 stream=directory if options.stream else None,
-                spare=spare,
+                fallback=fallback,
                 finished=results.write,
             )
     finally:
@@ -165,13 +165,13 @@ def _kept(directory: Path, streamed: bool, formats: Sequence[str]) -> Iterator[P
     if not LAST_CALL.watched:
         yield None
         return
-    spare = directory if streamed else directory / SPARE
-    LAST_CALL.note(json.dumps({"spare": str(spare), "out": str(directory), "formats": list(formats)}))
+    fallback = directory if streamed else directory / UNFINISHED
+    LAST_CALL.note(json.dumps({"fallback": str(fallback), "out": str(directory), "formats": list(formats)}))
     try:
-        yield None if streamed else spare
+        yield None if streamed else fallback
     finally:
         if not streamed:
-            shutil.rmtree(spare, ignore_errors=True)
+            shutil.rmtree(fallback, ignore_errors=True)
         LAST_CALL.note("")
 
 
@@ -214,7 +214,7 @@ def _output(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpa
         *(_tables(outcome) if outcome.result.table.size else []),
         cost_table(outcome.result),
         "" if study is None else study.table(),
-        judged_table(outcome.expectations),
+        evaluated_table(outcome.expectations),
     ]
     return Output(parts, data, paths, code, [] if failure is None else [f"the run ended early: {failure}"])
 

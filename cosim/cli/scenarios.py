@@ -24,8 +24,8 @@ def load_scenario(options: argparse.Namespace) -> Scenario:
         ScenarioError: there is none, or an override is not ``NAME=VALUE``.
     """
     scenario = Scenario.load(options.scenario, strict=getattr(options, "strict", False))
-    given = [parse_setting(setting) for setting in options.settings]
-    for name, value in sorted(given, key=lambda entry: entry[0] != CASE):  # what is said by name wins over a case
+    stated = [parse_setting(setting) for setting in options.settings]
+    for name, value in sorted(stated, key=lambda entry: entry[0] != CASE):  # what is said by name wins over a case
         scenario.set(name, value)
     return scenario
 

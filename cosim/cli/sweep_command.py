@@ -103,7 +103,7 @@ def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:
         raise ScenarioError(f"--cases: {scenario.name} has no cases; expected tables [cases.NAME] in it.")
     if options.by is not None and options.by not in values:
         raise ScenarioError(f"--by {options.by}: this is not varied; {nearest(options.by, list(values))}")
-    if options.samples is None and (ranges := [name for name, given in values.items() if isinstance(given, Range)]):
+    if options.samples is None and (ranges := [name for name, stated in values.items() if isinstance(stated, Range)]):
         raise ScenarioError(
             f"--vary {ranges[0]}: a range is sampled; say with --samples N at how many points, or list values: a,b."
         )
@@ -113,21 +113,21 @@ def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:
 def _cases(scenario: Scenario, settings: list[str], zipped: bool) -> dict[str, list[Any]]:
     """All cases, and what ``--set`` says of values that a case sets too: that wins, as it does for one run."""
     set_by_cases = {name for values in scenario.cases.values() for name in values}
-    given = dict(parse_setting(text) for text in settings)
+    stated = dict(parse_setting(text) for text in settings)
     times = len(scenario.cases) if zipped else 1
     return {CASE: list(scenario.cases)} | {
-        name: [value] * times for name, value in given.items() if name in set_by_cases
+        name: [value] * times for name, value in stated.items() if name in set_by_cases
     }
 
 
-def _values(given: list[str]) -> dict[str, Any]:
+def _values(stated: list[str]) -> dict[str, Any]:
     """Names and values of all ``--vary``.
 
     Raises:
         ScenarioError: one is not ``NAME=VALUES``, or a name is given twice.
     """
     values: dict[str, Any] = {}
-    for text in given:
+    for text in stated:
         name, sign, listed = (part.strip() for part in text.partition("="))
         if not (name and sign and listed):
             raise ScenarioError(

@@ -52,8 +52,8 @@ def asked_tolerances(options: argparse.Namespace) -> Asked:
         ComparisonError: a tolerance that cannot be, or a file that cannot be read.
     """
     default, by_signal, ignore = _read_file(Path(options.tolerances)) if options.tolerances else ({}, {}, [])
-    given = {"relative": options.rtol, "absolute": options.atol, "time": options.ttol}
-    default |= {key: value for key, value in given.items() if value is not None}
+    stated = {"relative": options.rtol, "absolute": options.atol, "time": options.ttol}
+    default |= {key: value for key, value in stated.items() if value is not None}
     settings = dict(map(_setting, options.tolerance_settings))
     by_signal = settings | {name: value for name, value in by_signal.items() if name not in settings}
     base = tolerance(default, Tolerance())
@@ -71,14 +71,14 @@ def chosen_tolerances(options: argparse.Namespace, asked: Asked, stored: Toleran
     """
     default, by_signal, ignore = asked
     base = tolerance(default, stored.default)
-    changed = {key: default[key] for key in ("relative", "absolute", "time") if _given(options, key)}
+    changed = {key: default[key] for key in ("relative", "absolute", "time") if _stated(options, key)}
     kept = {name: replace(old, **changed) for name, old in stored.by_signal.items() if name not in by_signal}
     return Tolerances(
         base, {name: tolerance(v, base) for name, v in by_signal.items()} | kept, (*ignore, *stored.ignore)
     )
 
 
-def _given(options: argparse.Namespace, key: str) -> bool:
+def _stated(options: argparse.Namespace, key: str) -> bool:
     return {"relative": options.rtol, "absolute": options.atol, "time": options.ttol}[key] is not None
 
 

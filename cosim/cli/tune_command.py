@@ -1,4 +1,4 @@
-"""``cosim tune``: parameters searched for the smallest cost over several seeds, and judged with others."""
+"""``cosim tune``: parameters searched for the smallest cost over several seeds, and validated with others."""
 
 from __future__ import annotations
 
@@ -41,11 +41,12 @@ HELP = "search parameters for the smallest cost over several seeds"
 EXAMPLES = ("cosim tune vendor.toml --observer observer --parameters theta=0.5:5:log",)
 PARSER = {
     "description": (
-        "Search parameters of an observer, an FMU or a scenario for the smallest cost over training seeds, and judge "
-        "the best with other seeds. An observer that only listens is run beside one recording of the plant a seed."
+        "Search parameters of an observer, an FMU or a scenario for the smallest cost over training seeds, and "
+        "validate the best with other seeds. An observer that only listens is run beside one recording of the "
+        "plant a seed."
     ),
     "epilog": (
-        "Exit codes: 0 done, 1 the judging seeds do not show that it became better, 2 error or interrupted; the "
+        "Exit codes: 0 done, 1 the validation seeds do not show that it became better, 2 error or interrupted; the "
         "history is in the folder, --resume goes on with it."
     ),
 }
@@ -73,7 +74,7 @@ ARGUMENTS = (
         "such as speed_error_rms; with a minus sign (--cost=-NAME) the largest is wanted",
     ),
     argument("--seeds", type=_seeds, default=[0], metavar="0:4", help="for training (default: 0)"),
-    argument("--judge", type=_seeds, default=[], metavar="10:20", help="for judging before and after"),
+    argument("--validate", type=_seeds, default=[], metavar="10:20", help="for validation before and after"),
     argument("--iterations", type=positive, default=20, metavar="N", help="default: 20"),
     argument(
         "--searches", type=positive, default=1, metavar="N", help="searches, each with another seed of the method"
@@ -100,7 +101,7 @@ def execute(options: argparse.Namespace) -> Output:
         found.parts(),
         found.to_data(),
         {"tuned": directory / "tuned.toml"},
-        code=_NOT_BETTER if found.judged and not found.gain.low > 0.0 else _DONE,
+        code=_NOT_BETTER if found.validated and not found.gain.low > 0.0 else _DONE,
         error=KeyboardInterrupt() if found.interrupted else None,
     )
 
@@ -114,7 +115,7 @@ def _tuned(scenario: Scenario, options: argparse.Namespace, directory: Path) -> 
             method=options.method,
             cost=options.cost,
             seeds=options.seeds,
-            judge=options.judge,
+            validate=options.validate,
             iterations=options.iterations,
             searches=options.searches,
             options=dict(parse_setting(text) for text in options.option),

@@ -20,7 +20,7 @@ from cosim.results.load_result import load_result
 from cosim.results.result import PacketRecord, Result, SignalInfo
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
-Given = Tolerance | Mapping[str, Any] | float
+StatedTolerance = Tolerance | Mapping[str, Any] | float
 """A tolerance as users write it, see `cosim.comparison.tolerance.tolerance`."""
 
 
@@ -51,7 +51,7 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
     lines += run_differences(reference, result)
     names = list(dict.fromkeys([*_unknown_names(reference), *_unknown_names(result)]))
     lines += [
-        f"The tolerance for {given!r} fits no signal; {nearest(given, names)}" for given in tolerances.unused(names)
+        f"The tolerance for {stated!r} fits no signal; {nearest(stated, names)}" for stated in tolerances.unused(names)
     ]
     return lines
 
@@ -201,9 +201,9 @@ def compare_results(
 def compare(
     reference: Any,
     result: Any,
-    tolerance: Given | None = None,
+    tolerance: StatedTolerance | None = None,
     *,
-    tolerances: Mapping[str, Given] | None = None,
+    tolerances: Mapping[str, StatedTolerance] | None = None,
     ignore: Iterable[str] = (),
     extra_fails: bool = False,
 ) -> Comparison:
@@ -225,17 +225,17 @@ def compare(
     return compare_results(_result_of(reference), _result_of(result), allowed, labels=labels, extra_fails=extra_fails)
 
 
-def _label_of(given: Result | str | Path | Any, otherwise: str) -> str:
+def _label_of(stated: Result | str | Path | Any, otherwise: str) -> str:
     """What a result is called in messages."""
-    return str(given) if isinstance(given, str | Path) else otherwise
+    return str(stated) if isinstance(stated, str | Path) else otherwise
 
 
-def _result_of(given: Any) -> Result:
-    if isinstance(given, str | Path):
-        return load_result(given)
-    held = getattr(given, "result", given)
+def _result_of(stated: Any) -> Result:
+    if isinstance(stated, str | Path):
+        return load_result(stated)
+    held = getattr(stated, "result", stated)
     if not isinstance(held, Result):
-        what = f"{type(given).__module__}.{type(given).__qualname__}"
+        what = f"{type(stated).__module__}.{type(stated).__qualname__}"
         raise ComparisonError(f"Cannot compare a {what}; expected a Result, an Outcome, or the path of a result.")
     return held
 
@@ -317,9 +317,9 @@ class _Pair:
         if self.tolerances.ignores(name):
             return SignalComparison(name, info.unit, "ignored", tolerance)
         near = [*_nearest(name, self.extra), *_nearest(name, self.has)] if status == "missing" else []
-        same = self._same_values(name) if status == "missing" else ""
+        equal = self._same_values(name) if status == "missing" else ""
         return SignalComparison(
-            name, info.unit, status, tolerance, nearest=list(dict.fromkeys(near))[:3], same_values=same
+            name, info.unit, status, tolerance, nearest=list(dict.fromkeys(near))[:3], same_values=equal
         )
 
     def _same_values(self, name: str) -> str:

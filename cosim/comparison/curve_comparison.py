@@ -25,7 +25,7 @@ _MOST_RUNS = (
 
 def _value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> list[ComparisonFinding]:
     """Runs of points outside the tube, each with its worst point."""
-    rows = np.flatnonzero(points.judged)
+    rows = np.flatnonzero(points.evaluated)
     size = np.abs(points.error[rows])
     found = []
     for a, b in _runs(size > allowed.value):
@@ -189,13 +189,13 @@ def compare_signal(task: Task) -> SignalComparison:
         task: the signal with its reference and what is allowed.
     """
     allowed = _allowed_for(task)
-    if _same(task.reference, task.result):
+    if _equal_curves(task.reference, task.result):
         return _equal(task, allowed)
     points, jumps = compare_points(task.reference, task.result, allowed)
     findings = _findings(task, points, jumps, allowed)
-    judged = np.flatnonzero(points.judged)
-    size = np.abs(points.error[judged])
-    at = int(judged[np.argmax(size)]) if len(judged) else None
+    evaluated = np.flatnonzero(points.evaluated)
+    size = np.abs(points.error[evaluated])
+    at = int(evaluated[np.argmax(size)]) if len(evaluated) else None
     return SignalComparison(
         task.name,
         task.unit,
@@ -207,7 +207,7 @@ def compare_signal(task: Task) -> SignalComparison:
         max_error=float(np.max(size)) if len(size) else float("nan"),
         max_error_at=float("nan") if at is None else float(points.time[at]),
         max_shift=float(np.max(np.abs(jumps.shift), initial=0.0)),
-        rms_error=_rms(points, judged),
+        rms_error=_rms(points, evaluated),
         share_outside=float(np.mean(size > allowed.value)) if len(size) else 0.0,
         worst=_worst(points, findings, at),
         findings=findings,
@@ -225,7 +225,7 @@ def _allowed_for(task: Task) -> Allowed:
     return Allowed(task.tolerance.value_for(scale), time + slack, scale, window)
 
 
-def _same(one: Curve, two: Curve) -> bool:
+def _equal_curves(one: Curve, two: Curve) -> bool:
     return np.array_equal(one.time, two.time) and np.array_equal(one.values, two.values, equal_nan=True)
 
 
@@ -262,15 +262,15 @@ def _findings(task: Task, points: Points, jumps: MatchedJumps, allowed: Allowed)
     return sorted(found, key=lambda f: (-f.size / f.allowed if f.allowed > 0.0 else -np.inf, f.time))
 
 
-def _rms(points: Points, judged: np.ndarray) -> float:
+def _rms(points: Points, evaluated: np.ndarray) -> float:
     """Time-weighted: the error of a point counts for half the way to the points before and after it."""
-    if not len(judged):
+    if not len(evaluated):
         return float("nan")
-    largest = float(np.max(np.abs(points.error[judged])))
+    largest = float(np.max(np.abs(points.error[evaluated])))
     if largest == 0.0 or not np.isfinite(largest):
         return largest
-    square = (points.error[judged] / largest) ** 2  # scaled, so that a diverged signal does not overflow
-    duration = np.diff(points.time[judged])
+    square = (points.error[evaluated] / largest) ** 2  # scaled, so that a diverged signal does not overflow
+    duration = np.diff(points.time[evaluated])
     total = float(np.sum(duration))
     if total == 0.0:
         return largest * float(np.sqrt(np.mean(square)))
@@ -285,7 +285,7 @@ def _worst(
         return []
     rows = [at]
     for finding in (f for f in findings if f.kind == "value"):
-        inside = np.flatnonzero((points.time >= finding.time) & (points.time <= finding.end) & points.judged)
+        inside = np.flatnonzero((points.time >= finding.time) & (points.time <= finding.end) & points.evaluated)
         rows.append(int(inside[np.argmax(np.abs(points.error[inside]))]))
     rows = list(dict.fromkeys(rows))[:WORST]
     columns = (points.time, points.reference, points.result, points.error)

@@ -11,7 +11,7 @@ from cosim.comparison.curve import Curve
 NEIGHBOURS = 4  # steps on either side that a step is held against
 _FAR_LARGER = 10.0  # times the steepest of them; an exponential must fall to a tenth in one sample to look like a jump
 SMALLEST = 1e-6  # of the range: rounding is no jump
-SAME_INSTANT = 1e-9  # of the time: how far rounding, also that of a file, moves an instant
+EQUAL_INSTANT = 1e-9  # of the time: how far rounding, also that of a file, moves an instant
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def shifts(reference: Jumps, result: Jumps) -> np.ndarray:
     """
     first, last = result.begin - reference.begin, result.end - reference.end
     smaller = np.where(np.abs(first) < np.abs(last), first, last)
-    together = np.abs(first) <= SAME_INSTANT * (1.0 + np.abs(reference.begin))
+    together = np.abs(first) <= EQUAL_INSTANT * (1.0 + np.abs(reference.begin))
     late = result.after_event & (reference.begin == reference.end)
     early = reference.after_event & (result.begin == result.end)
     return np.where(together & (late | early), last, np.where(first * last > 0.0, smaller, 0.0))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.comparison.curve import Curve
-from cosim.comparison.jumps import SAME_INSTANT, Jumps, choose, find_jumps, shifts
+from cosim.comparison.jumps import EQUAL_INSTANT, Jumps, choose, find_jumps, shifts
 from cosim.comparison.tube import band_of, held_band, project, widen_at_ends
 
 _ROUNDED_TIME = 1e-2  # of the allowed time: a baseline rounds times to less than that
@@ -33,9 +33,9 @@ def _match_jumps(reference: Jumps, result: Jumps, *, window: float, allowed: flo
         reference, result: the jumps. window: largest shift that is looked at [s]. allowed: difference in value [unit].
         scale: range of the signal [unit].
     """
-    same, short = _same_in_place(reference, result, allowed), min(len(reference), len(result))
-    head = int(np.argmin(np.append(same, False)))
-    back = _same_in_place(_last(reference, short - head), _last(result, short - head), allowed)[::-1]
+    equal, short = _equal_in_place(reference, result, allowed), min(len(reference), len(result))
+    head = int(np.argmin(np.append(equal, False)))
+    back = _equal_in_place(_last(reference, short - head), _last(result, short - head), allowed)[::-1]
     tail = int(np.argmin(np.append(back, False)))
     inner_a = choose(reference, np.arange(head, len(reference) - tail))
     inner_b = choose(result, np.arange(head, len(result) - tail))
@@ -51,7 +51,7 @@ def _last(jumps: Jumps, count: int) -> Jumps:
     return choose(jumps, np.arange(len(jumps) - count, len(jumps)))
 
 
-def _same_in_place(a: Jumps, b: Jumps, allowed: float) -> np.ndarray:
+def _equal_in_place(a: Jumps, b: Jumps, allowed: float) -> np.ndarray:
     """Whether the k-th jumps are at the same instant with values within the tolerance."""
     n = min(len(a), len(b))
     a, b = choose(a, np.arange(n)), choose(b, np.arange(n))
@@ -160,7 +160,7 @@ class Points:
     Args:
         time: [s]. error: signed difference of value beyond what the allowed time explains, result minus reference
             [unit]. reference, result: values there; that of the finer curve is the nearest one its tube allows.
-        judged: where both curves have a number in the same piece.
+        evaluated: where both curves have a number in the same piece.
         no_number: where one holds a number and the other does not, or they hold different kinds of none.
     """
 
@@ -168,7 +168,7 @@ class Points:
     error: np.ndarray
     reference: np.ndarray
     result: np.ndarray
-    judged: np.ndarray
+    evaluated: np.ndarray
     no_number: np.ndarray
 
 
@@ -228,7 +228,7 @@ def outside_between(points: Points, allowed: Allowed, begin: np.ndarray, end: np
         begin: [s], shape (n,).
         end: [s], shape (n,).
     """
-    outside = np.append(0, np.cumsum(points.judged & (np.abs(points.error) > allowed.value)))
+    outside = np.append(0, np.cumsum(points.evaluated & (np.abs(points.error) > allowed.value)))
     first = np.maximum(np.searchsorted(points.time, begin - allowed.time) - 1, 0)
     last = np.minimum(np.searchsorted(points.time, end + allowed.time, side="right") + 1, len(points.time))
     return np.asarray(outside[last] > outside[first])
@@ -268,12 +268,12 @@ class _View:
             begin = _from_event(fine, coarse, self.tolerance, starts[piece], ends[piece])
             where = coarse.time, self.tolerance, begin, ends[piece]
             band = widen_at_ends(band_of(fine, *where), fine, *where)
-        judged = band.judged & self.usable
+        evaluated = band.evaluated & self.usable
         last = np.maximum(np.searchsorted(self.original.time, coarse.time, side="right") - 1, 0)
-        nearest = np.where(judged, np.clip(coarse.filled, band.low, band.high), self.original.values[last])
-        error = np.where(judged, (nearest - coarse.values) if self.swap else (coarse.values - nearest), np.nan)
+        nearest = np.where(evaluated, np.clip(coarse.filled, band.low, band.high), self.original.values[last])
+        error = np.where(evaluated, (nearest - coarse.values) if self.swap else (coarse.values - nearest), np.nan)
         one, two = (coarse.values, nearest) if self.swap else (nearest, coarse.values)
-        return Points(coarse.time, error, one, two, judged, self.no_number)
+        return Points(coarse.time, error, one, two, evaluated, self.no_number)
 
 
 def _view(reference: Curve, result: Curve, tolerance: float) -> _View:
@@ -281,12 +281,12 @@ def _view(reference: Curve, result: Curve, tolerance: float) -> _View:
     original, coarse = (result, reference) if swap else (reference, result)
     no_number, usable = _numbers(original, coarse, tolerance)
     fine = original
-    if fine.held and not _same_rows(fine.time, coarse.time, tolerance):
+    if fine.held and not _equal_rows(fine.time, coarse.time, tolerance):
         fine = project(fine, coarse, tolerance)  # what happens between two rows of the coarser one cannot be seen in it
     return _View(fine, coarse, original, swap, usable, no_number, tolerance)
 
 
-def _same_rows(one: np.ndarray, two: np.ndarray, tolerance: float) -> bool:
+def _equal_rows(one: np.ndarray, two: np.ndarray, tolerance: float) -> bool:
     """Whether two sides have the same rows, but for digits of the times that a baseline does not keep."""
     return len(one) == len(two) and bool(np.all(np.abs(one - two) <= _ROUNDED_TIME * tolerance))
 
@@ -316,7 +316,7 @@ def _outside_near(uncut: Points, jumps: MatchedJumps, allowed: Allowed) -> np.nd
 
 
 def _count_outside(points: Points, allowed: Allowed) -> int:
-    return int(np.count_nonzero(points.judged & (np.abs(points.error) > allowed.value)))
+    return int(np.count_nonzero(points.evaluated & (np.abs(points.error) > allowed.value)))
 
 
 def _is_patchwork(jumps: MatchedJumps, apart: np.ndarray, allowed: float, explains: bool) -> bool:
@@ -342,9 +342,9 @@ def _from_event(fine: Curve, coarse: Curve, tolerance: float, first: np.ndarray,
     """
     at, rows = coarse.time, np.flatnonzero(np.append(False, np.diff(coarse.time) == 0.0))
     following = np.append(at, np.inf)[rows + 1]
-    found = np.searchsorted(fine.time, at[rows] + SAME_INSTANT * (1.0 + np.abs(at[rows])), side="right") - 1
+    found = np.searchsorted(fine.time, at[rows] + EQUAL_INSTANT * (1.0 + np.abs(at[rows])), side="right") - 1
     event = (found > 0) & (fine.time[found] == fine.time[found - 1]) & (following > at[rows] + tolerance)
-    event &= np.abs(fine.time[found] - at[rows]) <= SAME_INSTANT * (1.0 + np.abs(at[rows]))
+    event &= np.abs(fine.time[found] - at[rows]) <= EQUAL_INSTANT * (1.0 + np.abs(at[rows]))
     event &= (found >= first[rows]) & (found < last[rows])
     begin = first.copy()
     begin[rows[event]] = found[event]
@@ -373,10 +373,10 @@ def _sides_of_events(
     fine: np.ndarray, coarse: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Ranges of fine rows [a, b), where both sides have two rows of an event only the one on the same side of it."""
-    same = np.diff(coarse) == 0.0
+    equal = np.diff(coarse) == 0.0
     last = np.minimum(b, len(fine)) - 1
     event = (b - a == 2) & (fine[a] == fine[last])
-    return np.where(event & np.append(False, same), last, a), np.where(event & np.append(same, False), last, b)
+    return np.where(event & np.append(False, equal), last, a), np.where(event & np.append(equal, False), last, b)
 
 
 def _kinds(curve: Curve) -> list[np.ndarray]:

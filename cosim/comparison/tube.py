@@ -15,12 +15,12 @@ class _TubeBand:
 
     Args:
         low, high: smallest and largest value [unit].
-        judged: False where the curve has no value within the allowed time: beyond its end, or in another piece.
+        evaluated: False where the curve has no value within the allowed time: beyond its end, or in another piece.
     """
 
     low: np.ndarray
     high: np.ndarray
-    judged: np.ndarray
+    evaluated: np.ndarray
 
 
 def band_of(
@@ -41,14 +41,14 @@ def band_of(
     last = np.broadcast_to(np.asarray(len(time) if last is None else last), at.shape)
     begin, end = time[first], time[np.minimum(last, len(time) - 1) if curve.held else last - 1]
     low, high = np.maximum(at - tolerance, begin), np.minimum(at + tolerance, end)
-    judged = low <= high
-    low = np.where(judged, low, np.clip(at, begin, end))
-    high = np.where(judged, high, low)
+    evaluated = low <= high
+    low = np.where(evaluated, low, np.clip(at, begin, end))
+    high = np.where(evaluated, high, low)
     ends = [_value(curve, low, first, last), _value(curve, high, first, last)]
     a = np.maximum(np.searchsorted(time, low), first)
     b = np.minimum(np.searchsorted(time, high, side="right"), last)
     smallest, largest = _range_extremes(values, a, b)
-    return _TubeBand(np.minimum.reduce([*ends, smallest]), np.maximum.reduce([*ends, largest]), judged)
+    return _TubeBand(np.minimum.reduce([*ends, smallest]), np.maximum.reduce([*ends, largest]), evaluated)
 
 
 def widen_at_ends(
@@ -73,14 +73,14 @@ def widen_at_ends(
         (-1, at + tolerance > curve.time[-1], last == len(curve.time)),
     ]
     for row, beyond, in_piece in ends:
-        near = np.flatnonzero(beyond & in_piece & band.judged)
+        near = np.flatnonzero(beyond & in_piece & band.evaluated)
         if len(near):
             end, value = np.full(len(near), curve.time[row]), curve.filled[row]
             reach = tolerance - (at[near] - end if row == 0 else end - at[near])
             inner = band_of(curve, end, reach, first[near], last[near])
             low[near] = np.minimum(low[near], 2.0 * value - inner.high)
             high[near] = np.maximum(high[near], 2.0 * value - inner.low)
-    return _TubeBand(low, high, band.judged)
+    return _TubeBand(low, high, band.evaluated)
 
 
 def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarray) -> _TubeBand:
@@ -97,21 +97,21 @@ def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarra
     begin, middle = (band_of(curve, at, tolerance, first, last) for at in (time, 0.5 * (time + until)))
     end = _band_before(curve, until, tolerance, first, last)
     holds = until > time
-    judged = np.stack([begin.judged, middle.judged & holds, end.judged & holds])
-    low = np.max(np.where(judged, [begin.low, middle.low, end.low], -np.inf), axis=0)
-    high = np.min(np.where(judged, [begin.high, middle.high, end.high], np.inf), axis=0)
-    return _TubeBand(np.minimum(low, high), high, np.asarray(judged.any(axis=0)))
+    evaluated = np.stack([begin.evaluated, middle.evaluated & holds, end.evaluated & holds])
+    low = np.max(np.where(evaluated, [begin.low, middle.low, end.low], -np.inf), axis=0)
+    high = np.min(np.where(evaluated, [begin.high, middle.high, end.high], np.inf), axis=0)
+    return _TubeBand(np.minimum(low, high), high, np.asarray(evaluated.any(axis=0)))
 
 
 def _band_before(curve: Curve, until: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray) -> _TubeBand:
     """As `band_of`, of a held curve just before the instants."""
     time = curve.time
     begin, end = time[first], time[np.minimum(last, len(time) - 1)]
-    judged = (until + tolerance > begin) & (until - tolerance <= end)
+    evaluated = (until + tolerance > begin) & (until - tolerance <= end)
     low = np.clip(until - tolerance, begin, end)
     a = np.clip(np.searchsorted(time, low) - 1, first, last - 1)
     b = np.clip(np.searchsorted(time, until + tolerance), a + 1, last)
-    return _TubeBand(*_range_extremes(curve.filled, a, b), judged)
+    return _TubeBand(*_range_extremes(curve.filled, a, b), evaluated)
 
 
 def project(curve: Curve, onto: Curve, tolerance: float) -> Curve:
@@ -121,7 +121,7 @@ def project(curve: Curve, onto: Curve, tolerance: float) -> Curve:
         curve: the finer one. onto: the coarser one. tolerance: [s].
     """
     band = band_of(curve, onto.time, tolerance)
-    values = np.where(onto.finite & band.judged, np.clip(onto.filled, band.low, band.high), band.low)
+    values = np.where(onto.finite & band.evaluated, np.clip(onto.filled, band.low, band.high), band.low)
     return Curve(onto.time, values, held=True)
 
 

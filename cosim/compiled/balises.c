@@ -14,9 +14,9 @@ typedef struct {
     double t, until;
     double p0, v0, p1, v1; /* position and speed of the plant at both ends */
     bool found, read;      /* a balise is passed; the odometer was read */
-    bool told;             /* by somebody */
+    bool notified;         /* by somebody */
     int64_t which;
-    double stamp, told_at;
+    double stamp, notified_at;
     double position, speed, reading; /* there */
 } Over;
 
@@ -269,11 +269,11 @@ static void read_odometer(Over *over) {
 }
 
 static double snapped(const Over *over) {
-    double told_at = over->stamp < over->t ? over->t : over->stamp;
-    told_at = over->until < told_at ? over->until : told_at;
-    if (over->until - told_at <= TIME_TOLERANCE)
+    double notified_at = over->stamp < over->t ? over->t : over->stamp;
+    notified_at = over->until < notified_at ? over->until : notified_at;
+    if (over->until - notified_at <= TIME_TOLERANCE)
         return over->until;
-    return told_at - over->t <= TIME_TOLERANCE ? over->t : told_at;
+    return notified_at - over->t <= TIME_TOLERANCE ? over->t : notified_at;
 }
 
 static void fill_in(const Over *over, double *fields) {
@@ -293,18 +293,18 @@ static void fill_in(const Over *over, double *fields) {
     fields[FIELD_ODOMETER_READING] = over->reading;
 }
 
-static bool tell_receiver(Over *over, int64_t which, Telegram *telegram) {
+static bool notify_receiver(Over *over, int64_t which, Telegram *telegram) {
     read_odometer(over);
-    over->told_at = snapped(over);
-    over->told = true;
+    over->notified_at = snapped(over);
+    over->notified = true;
     double fields[FIELDS];
     fill_in(over, fields);
     for (int64_t i = 0; i < telegram->payload_count; i++)
         telegram->payload[i] = fields[telegram->fields[i]];
-    const double times[3] = {over->t, over->told_at, over->until};
+    const double times[3] = {over->t, over->notified_at, over->until};
     Slave *slave = &over->program->slaves[which];
     slave->calls_here = (times[1] > times[0]) + (times[2] > times[1]);
-    if (!tell(over->program, which, telegram, times))
+    if (!notify(over->program, which, telegram, times))
         return false;
     slave->now = over->until;
     return true;
@@ -321,7 +321,7 @@ static bool move_all(Over *over) {
         if (i == program->watch.slave)
             ordinary = program->balises.recorded != NULL ? play_plant(over) : move_plant(over);
         else if (over->found && telegram != NULL)
-            ordinary = tell_receiver(over, i, telegram);
+            ordinary = notify_receiver(over, i, telegram);
         else
             ordinary = drive(program, i, over->t, over->until);
         slave->seconds_over += now() - begin;
@@ -341,7 +341,7 @@ static int64_t write_rows(Over *over, double *rows) {
     size_t width = (size_t)program->value_count + 1;
     double nominal = over->stamp < over->t ? over->t : over->stamp;
     nominal = over->until < nominal ? over->until : nominal;
-    double time = over->told ? over->told_at : nominal, *before = rows + 1, *after = before + width;
+    double time = over->notified ? over->notified_at : nominal, *before = rows + 1, *after = before + width;
     memcpy(balises->arrived, program->values, (size_t)program->value_count * sizeof(double));
     for (int64_t i = 0; i < program->slave_count; i++)
         if (balises->telegrams[i] != NULL && time == over->until) {

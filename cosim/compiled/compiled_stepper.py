@@ -273,14 +273,14 @@ class CompiledStepper:
             move(t, until)
 
     @contextmanager
-    def _repeated(self, answers: Mapping[int, Mapping[str, Sequence[RecordedReturn]]]) -> Iterator[None]:
+    def _repeated(self, responses: Mapping[int, Mapping[str, Sequence[RecordedReturn]]]) -> Iterator[None]:
         """Python is at work on a step that the stepper has begun: slaves repeat themselves, and nobody calls the
         stepper.
         """
         self._repeating = True
         try:
             with ExitStack() as stack:
-                for place, said in answers.items():
+                for place, said in responses.items():
                     slave = self.plan.steps[place].component.slave
                     if not isinstance(slave, RecordingSlave):  # which goes to any time, whatever it was asked before
                         stack.enter_context(repeated(slave, said))

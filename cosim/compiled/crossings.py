@@ -31,7 +31,7 @@ from fmus.fmi.standard import NEVER, TIME_TOLERANCE
 AT_MOST = 256
 """Crossings in one chunk."""
 
-WORDS = (*OUTCOMES, "told")
+WORDS = (*OUTCOMES, "notified")
 """By rank; the last one stands for an outcome that is not known."""
 
 

@@ -110,9 +110,9 @@ class StepperJournal:
             versions: of FMI, of each slave.
         """
         for note in self._notes[: self._head.count]:
-            yield note.slave, StepperCall(note.call), note.port, self._answer(note, versions[note.slave])
+            yield note.slave, StepperCall(note.call), note.port, self._response(note, versions[note.slave])
 
-    def _answer(self, note: CNote, version: int) -> RecordedReturn:
+    def _response(self, note: CNote, version: int) -> RecordedReturn:
         call = StepperCall(note.call)
         if call is StepperCall.STEP and version == FMI3:
             event, terminate, early = (bool(flag) for flag in note.flags[:3])

@@ -48,7 +48,7 @@ static bool copy_outputs(Program *program, int64_t which, double *target) {
 }
 
 /* The counts of what became of events: of those that have grown the one that says most tells of an event that was told and is not settled yet. */
-static bool count(Program *program, int64_t which, Telegram *telegram, bool told) {
+static bool count(Program *program, int64_t which, Telegram *telegram, bool notified) {
     int32_t counts[OUTCOMES_AT_MOST];
     size_t number = (size_t)telegram->count_count;
     if (telegram->get_counts == NULL)
@@ -58,7 +58,7 @@ static bool count(Program *program, int64_t which, Telegram *telegram, bool told
         note_bytes(program, note(program, which, CALL_COUNT, 0), counts, number * sizeof(int32_t));
     if (program->status > STATUS_WARNING)
         return false;
-    const bool open = told && telegram->outcome < 0;
+    const bool open = notified && telegram->outcome < 0;
     for (size_t i = 0; i < number; i++) {
         int64_t rank = telegram->count_ranks[i];
         if (open && rank >= 0 && counts[i] > telegram->seen[i] && (telegram->outcome < 0 || rank < telegram->outcome))
@@ -68,7 +68,7 @@ static bool count(Program *program, int64_t which, Telegram *telegram, bool told
     return true;
 }
 
-static bool tell_stage(Program *program, int64_t which, Telegram *telegram, const double times[3], int64_t stage) {
+static bool notify_stage(Program *program, int64_t which, Telegram *telegram, const double times[3], int64_t stage) {
     const uint32_t clock = (uint32_t)telegram->clock;
     const bool on = true, arrives = times[1] > times[0], goes_on = times[2] > times[1];
     void *instance = program->slaves[which].instance;
@@ -97,10 +97,10 @@ static bool tell_stage(Program *program, int64_t which, Telegram *telegram, cons
     }
 }
 
-static bool tell(Program *program, int64_t which, Telegram *telegram, const double times[3]) {
+static bool notify(Program *program, int64_t which, Telegram *telegram, const double times[3]) {
     telegram->outcome = -1;
     for (int64_t stage = STAGE_SEND; stage < STAGE_DONE; stage++)
-        if (!tell_stage(program, which, telegram, times, stage))
+        if (!notify_stage(program, which, telegram, times, stage))
             return false;
     return true;
 }
@@ -122,7 +122,7 @@ EXPORTED int64_t stepper_deliver(Program *program, int64_t which, Telegram *tele
     program->slaves[which].returns_here = 0;
     program->journal.count = program->journal.used = 0;
     program->journal.on = 1;
-    bool ordinary = tell(program, which, telegram, times);
+    bool ordinary = notify(program, which, telegram, times);
     program->journal.on = 0;
     return ordinary;
 }

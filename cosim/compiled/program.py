@@ -46,7 +46,7 @@ KINDS = (
     "Boolean32",
 )
 FMI3 = 3
-SAME_AS = {"Real": "Float64", "Integer": "Int32"}
+EQUAL_TO = {"Real": "Float64", "Integer": "Int32"}
 
 
 class Stop(IntEnum):
@@ -185,12 +185,12 @@ class Program:
     def journalled(self) -> dict[int, dict[str, list[RecordedReturn]]]:
         """What slaves have said since the journal was begun: by place in the plan, then by function, in order."""
         said: dict[int, dict[str, list[RecordedReturn]]] = {}
-        for place, call, port, answer in self.journal.read(self._versions):
+        for place, call, port, response in self.journal.read(self._versions):
             name = call.function(self._versions[place])
             name = (
                 {StepperCall.SET: self.writes, StepperCall.GET: self.reads}[call][place][port] if name is None else name
             )
-            said.setdefault(place, {}).setdefault(name, []).append(answer)
+            said.setdefault(place, {}).setdefault(name, []).append(response)
         return said
 
     # -- slaves -----------------------------------------------------------------------------------------------------
@@ -247,7 +247,7 @@ class Program:
         self, component: Component, verb: str, kind: str, members: Sequence[tuple[int, Element]], values: np.ndarray
     ) -> CPort:
         version = component.fmi_version
-        word = f"Boolean{32 if version == 2 else 8}" if kind == "Boolean" else SAME_AS.get(kind, kind)
+        word = f"Boolean{32 if version == 2 else 8}" if kind == "Boolean" else EQUAL_TO.get(kind, kind)
         first, total = _first_values([element for _, element in members])
         if verb == "Set" and total != len(members):
             raise NotCompilable(f"some elements of an array of {component.name} have a source and others have none")

@@ -63,26 +63,26 @@ def bytes_wanted(function: str, arguments: Sequence[Any]) -> int:
 
 
 @contextmanager
-def repeated(slave: Any, answers: Mapping[str, Sequence[RecordedReturn]]) -> Iterator[None]:
-    """Within this context each function in `answers` answers its first calls so; further calls reach the library.
+def repeated(slave: Any, responses: Mapping[str, Sequence[RecordedReturn]]) -> Iterator[None]:
+    """Within this context the first calls of functions in `responses` return these; further calls reach the library.
 
     Args:
         slave: that is driven.
     """
     functions: dict[str, Any] = slave._functions
-    real = {name: functions[name] for name in answers}
+    real = {name: functions[name] for name in responses}
 
     def stand_in(name: str, waiting: list[RecordedReturn]) -> Any:
         def call(*arguments: Any) -> int:
-            answer = waiting.pop(0)
+            response = waiting.pop(0)
             if not waiting:
                 functions[name] = real[name]
-            return answer(name, *arguments)
+            return response(name, *arguments)
 
         call.restype, call.argnames, call.argtypes = ctypes.c_int, (), ()  # type: ignore[attr-defined]
         return call
 
-    functions.update({name: stand_in(name, list(queue)) for name, queue in answers.items() if queue})
+    functions.update({name: stand_in(name, list(queue)) for name, queue in responses.items() if queue})
     try:
         yield
     finally:

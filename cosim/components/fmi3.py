@@ -89,8 +89,8 @@ class FMI3Component(Component, FMI3Slave):
     def _configure_slave(self) -> None:
         """Structural parameters are set in Configuration Mode, right after the instance was made."""
         if self._structure:
-            given = ", ".join(f"{name} = {value}" for name, value in self._structure.items())
-            self.guard(f"setting {given} in Configuration Mode", self._set_structure)
+            stated = ", ".join(f"{name} = {value}" for name, value in self._structure.items())
+            self.guard(f"setting {stated} in Configuration Mode", self._set_structure)
             self._configured = dict(self._structure)
 
     def _set_structure(self) -> None:
@@ -116,13 +116,13 @@ def _resize(description: ModelDescription, structure: Mapping[str, int]) -> None
             variable.shape = tuple(_extent(dimension, by_reference) for dimension in variable.dimensions)
             fault = shape_fault(variable)
             if fault is not None:
-                given = ", ".join(f"{name} = {value}" for name, value in structure.items())
-                raise CouplingError(f"With {given or 'its start values'}: {fault}")
+                stated = ", ".join(f"{name} = {value}" for name, value in structure.items())
+                raise CouplingError(f"With {stated or 'its start values'}: {fault}")
 
 
-def _extent(dimension: Any, given: Mapping[int, int]) -> int:
+def _extent(dimension: Any, stated: Mapping[int, int]) -> int:
     if dimension.start is not None:
         return int(dimension.start)
-    if dimension.valueReference in given:
-        return given[dimension.valueReference]
+    if dimension.valueReference in stated:
+        return stated[dimension.valueReference]
     return int(dimension.variable.start)

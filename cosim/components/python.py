@@ -53,7 +53,7 @@ class _PythonSlave:
         widths = [sum(signal.width for signal in group) for group in self._groups]
         self._ends = [0, *np.cumsum(widths).tolist()]
         self._values = np.array([x for group in self._groups for s in group for x in s.start_values])
-        self._given: dict[str, Any] = {}
+        self._stated: dict[str, Any] = {}
         self._made: Any = None
         self._time, self._notified = NO_TIME, False
         self.model_description = self.modelDescription = self._describe()
@@ -108,7 +108,7 @@ class _PythonSlave:
         Args:
             startTime: [s]. stopTime: [s], without effect.
         """
-        self._made, self._time = self.model.make(self._given), startTime
+        self._made, self._time = self.model.make(self._stated), startTime
         self._take(None, "")
 
     def exitInitializationMode(self) -> None:
@@ -199,8 +199,8 @@ class _PythonSlave:
         """Set inputs, parameters and fields of a telegram."""
         self._values[np.array(vr, dtype=np.intp) - 1] = values
         if any(self._ends[2] < reference <= self._ends[3] for reference in vr):
-            self._given = {
-                signal.name: self.model.as_given(signal, self._values[self._ends[2] :][self._parameters[signal.name]])
+            self._stated = {
+                signal.name: self.model.as_stated(signal, self._values[self._ends[2] :][self._parameters[signal.name]])
                 for signal in self.model.parameter_signals
             }
 

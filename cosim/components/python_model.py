@@ -50,16 +50,16 @@ class PythonModel:
     """An object of the user's, made anew for each run.
 
     Args:
-        given: the class, or an instance, of which each run has a copy.
+        stated: the class, or an instance, of which each run has a copy.
         options: arguments of the constructor that are no parameters. where: place for messages.
 
     Raises:
         ScenarioError: its declarations cannot be, or it cannot be made or copied.
     """
 
-    def __init__(self, given: Any, options: Mapping[str, Any], where: str) -> None:
-        self.given, self.options, self.where = given, dict(options), where
-        self.cls: type = given if isinstance(given, type) else type(given)
+    def __init__(self, stated: Any, options: Mapping[str, Any], where: str) -> None:
+        self.stated, self.options, self.where = stated, dict(options), where
+        self.cls: type = stated if isinstance(stated, type) else type(stated)
         self.inputs = self._declared("inputs", "input")
         self.outputs = self._declared("outputs", "output")
         self.kinds: dict[str, type] = {}  # of the parameters, by name
@@ -89,12 +89,12 @@ class PythonModel:
 
     def _declared(self, attribute: str, causality: Causality) -> tuple[Signal, ...]:
         """Signals out of ``{"speed": "m/s"}``, ``{"estimate": ("m", 3)}``, ``["speed"]`` or signals."""
-        declared = getattr(self.given, attribute, ())
+        declared = getattr(self.stated, attribute, ())
         try:
             if isinstance(declared, str | bytes):
                 raise TypeError("it is a text")
             if isinstance(declared, Mapping):
-                return tuple(_signal(name, given, causality) for name, given in declared.items())
+                return tuple(_signal(name, stated, causality) for name, stated in declared.items())
             return tuple(s if isinstance(s, Signal) else Signal(s, UNKNOWN_UNIT, causality) for s in declared)
         except (TypeError, ValueError, AttributeError) as error:
             raise self._refused(
@@ -115,7 +115,7 @@ class PythonModel:
         """The arguments of the constructor whose defaults are numbers; of an instance its attributes of these names."""
         found = []
         for argument in self._arguments(self.cls, "its constructor"):
-            held = argument.default if self.given is self.cls else getattr(self.given, argument.name, None)
+            held = argument.default if self.stated is self.cls else getattr(self.stated, argument.name, None)
             value = np.asarray(held if held is not None else "")
             if argument.name not in self.options and value.dtype.kind in "fiub" and value.ndim <= 1:
                 start = float(value) if value.ndim == 0 else tuple(map(float, value))
@@ -124,7 +124,7 @@ class PythonModel:
                 self.kinds[argument.name] = {"b": bool, "f": float}.get(value.dtype.kind, int)
         return tuple(found)
 
-    def as_given(self, signal: Signal, values: np.ndarray) -> Any:
+    def as_stated(self, signal: Signal, values: np.ndarray) -> Any:
         """The value of a parameter in the type of its default: a whole number stays one where it can.
 
         Args:
@@ -137,7 +137,7 @@ class PythonModel:
 
     def _direct(self) -> dict[str, list[str]]:
         """Which outputs follow which inputs at once: ``direct = {"speed": ["odometer"]}``; by default none does."""
-        declared = getattr(self.given, "direct", {})
+        declared = getattr(self.stated, "direct", {})
         inputs, outputs = ([s.name for s in signals] for signals in (self.inputs, self.outputs))
         for output, sources in declared.items() if isinstance(declared, Mapping) else [("direct", [])]:
             if output not in outputs or isinstance(sources, str) or not set(sources) <= set(inputs):
@@ -145,9 +145,9 @@ class PythonModel:
         return {output: list(sources) for output, sources in declared.items()}
 
     def _check_step(self) -> None:
-        bound = self.given is not self.cls or isinstance(getattr_static(self.cls, "step"), staticmethod)
+        bound = self.stated is not self.cls or isinstance(getattr_static(self.cls, "step"), staticmethod)
         try:
-            arguments = signature(self.given.step)
+            arguments = signature(self.stated.step)
         except (TypeError, ValueError):  # of compiled code, say
             return
         try:
@@ -157,10 +157,10 @@ class PythonModel:
 
     def _telegram(self) -> tuple[str, ...] | None:
         """What ``balise`` takes; None where there is no such method."""
-        call = getattr(self.given, "balise", None)
+        call = getattr(self.stated, "balise", None)
         if not callable(call):
             return None
-        bound = self.given is not self.cls or isinstance(getattr_static(self.cls, "balise"), staticmethod)
+        bound = self.stated is not self.cls or isinstance(getattr_static(self.cls, "balise"), staticmethod)
         named = self._arguments(call, "balise")[0 if bound else 1 :]
         unknown = [a.name for a in named if a.name not in TELEGRAM and a.default is Parameter.empty]
         if unknown:
@@ -189,13 +189,13 @@ class PythonModel:
         Raises:
             PythonModelError: it cannot be made, or the given instance cannot be copied.
         """
-        if self.given is self.cls:
+        if self.stated is self.cls:
             try:
                 return make(self.cls, {**self.options, **values})
             except UserFileError as error:
                 raise _PythonModelError(str(error)) from error
         try:
-            copy = deepcopy(self.given)
+            copy = deepcopy(self.stated)
         except Exception as error:
             raise _PythonModelError(
                 f"the given instance cannot be copied for a run: {explained(error)}; give the class in its place"
@@ -226,11 +226,11 @@ class PythonModel:
         except (Exception, SystemExit) as error:
             raise _PythonModelError(f"{what} raised {explained(error, self.file)}") from error
 
-    def output_values(self, made: Any, given: Any, call: str, held: np.ndarray | None = None) -> np.ndarray:
+    def output_values(self, made: Any, stated: Any, call: str, held: np.ndarray | None = None) -> np.ndarray:
         """The outputs after a call: out of the mapping that it returned, else attributes of their names.
 
         Args:
-            made: the object. given: what the call returned. call: its name, for messages; empty before the first step.
+            made: the object. stated: what the call returned. call: its name, for messages; empty before the first step.
             held: values of the outputs that are to stay where nothing is said of them, shape (q,); None for none.
 
         Returns:
@@ -239,33 +239,33 @@ class PythonModel:
         Raises:
             PythonModelError: an output is missing, of a wrong shape, or no finite number.
         """
-        if given is not None and not isinstance(given, Mapping):
+        if stated is not None and not isinstance(stated, Mapping):
             raise _PythonModelError(
-                f"{call} returned a {type(given).__name__}, expected a dict of outputs or, with attributes, None"
+                f"{call} returned a {type(stated).__name__}, expected a dict of outputs or, with attributes, None"
             )
         known = [signal.name for signal in self.outputs]
-        for name in given or ():
+        for name in stated or ():
             if name not in known:
                 raise _PythonModelError(f"{call} returned {name!r}, which is no output; {nearest(str(name), known)}")
         places = slices(self.outputs)
         values = np.zeros(sum(signal.width for signal in self.outputs)) if held is None else held.copy()
         for signal in self.outputs:
-            value = self._value(signal, made, given or {}, call, held is None and call != "")
+            value = self._value(signal, made, stated or {}, call, held is None and call != "")
             if value is not None:
                 values[places[signal.name]] = value
         return values
 
     def _value(
-        self, signal: Signal, made: Any, given: Mapping[str, Any], call: str, demanded: bool
+        self, signal: Signal, made: Any, stated: Mapping[str, Any], call: str, demanded: bool
     ) -> np.ndarray | None:
         """One output; None where nothing is said of it, which is refused where it is demanded."""
-        if signal.name not in given and not hasattr(made, signal.name):
+        if signal.name not in stated and not hasattr(made, signal.name):
             if not demanded:
                 return None
             raise _PythonModelError(
                 f"no output {signal.name!r}: return it from {call} in a dict, or keep it as self.{signal.name}"
             )
-        found = given[signal.name] if signal.name in given else getattr(made, signal.name)
+        found = stated[signal.name] if signal.name in stated else getattr(made, signal.name)
         try:
             value = np.asarray(found)
         except Exception as error:  # of a tensor that belongs to a graph, say
@@ -322,12 +322,12 @@ def _copies(value: Any) -> bool:
     return True
 
 
-def _signal(name: str, given: Any, causality: Causality) -> Signal:
-    if isinstance(given, Signal):
-        return given
-    unit, size = given if isinstance(given, tuple) else (given, None)
+def _signal(name: str, stated: Any, causality: Causality) -> Signal:
+    if isinstance(stated, Signal):
+        return stated
+    unit, size = stated if isinstance(stated, tuple) else (stated, None)
     if not isinstance(unit, str | None) or not (size is None or (isinstance(size, int) and size > 0)):
-        raise TypeError(f"{name!r} has {given!r}")
+        raise TypeError(f"{name!r} has {stated!r}")
     if unit:
         parse_unit(unit)  # refuses what is none
     return Signal(name, unit or UNKNOWN_UNIT, causality, size=size)

@@ -335,8 +335,8 @@ def _events(time: np.ndarray, values: np.ndarray, telegrams: np.ndarray) -> np.n
     last = np.append(first[1:], len(time)) - 1
     several = first < last
     first, last = first[several], last[several]
-    same = (values[first] == values[last]) | (np.isnan(values[first]) & np.isnan(values[last]))
-    differ = ~np.all(same, axis=1)
+    equal = (values[first] == values[last]) | (np.isnan(values[first]) & np.isnan(values[last]))
+    differ = ~np.all(equal, axis=1)
     known = np.append(np.sort(telegrams[np.isfinite(telegrams)]), np.inf)  # NaN are those that were missed
     listed = known[np.searchsorted(known, time[first] - TIME_TOLERANCE)] <= time[first] + TIME_TOLERANCE
     return np.asarray(time[first][differ | ~listed])

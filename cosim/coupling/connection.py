@@ -145,8 +145,8 @@ def event_connection(pair: Link, components: Mapping[str, Component]) -> Connect
     Raises:
         CouplingError: an unknown variable, a wrong causality, or units that do not fit.
     """
-    source_name, target_name, *given = pair
-    transformation = given[0] if given else Transformation()
+    source_name, target_name, *stated = pair
+    transformation = stated[0] if stated else Transformation()
     source = split_name(source_name, components, "Connection source")
     target = split_name(target_name, components, "Connection target")
     components[source[0]].variable(source[1], *SOURCES)
@@ -243,7 +243,9 @@ def _misfit(source: ModelVariable, target: ModelVariable) -> str:
 
 
 def unconnected_inputs(
-    connections: Sequence[Connection], components: Iterable[Component], given: Mapping[str, Iterable[str]] | None = None
+    connections: Sequence[Connection],
+    components: Iterable[Component],
+    stated: Mapping[str, Iterable[str]] | None = None,
 ) -> list[str]:
     """Names of inputs, and of elements of arrays, without a source; they keep their start values.
 
@@ -251,9 +253,9 @@ def unconnected_inputs(
 
     Args:
         connections: checked. components: all of them.
-        given: by component the names whose values were given on purpose; they are not reported.
+        stated: by component the names whose values were given on purpose; they are not reported.
     """
-    set_by_hand = {(name, signal) for name, signals in (given or {}).items() for signal in signals}
+    set_by_hand = {(name, signal) for name, signals in (stated or {}).items() for signal in signals}
     taken = {c.target for c in connections} | set_by_hand
     return [
         f"{c.name}.{name}" for c in components for v in _to_connect(c, taken) for name in _without_source(c, v, taken)

@@ -91,11 +91,11 @@ class _Search(Generic[Node]):
         for a, b in edges:
             self._successors[a].append(b)
             self._waits_for[b] += 1
-        self._given: dict[Node, list[int]] = {node: [] for node in nodes}
+        self._stated: dict[Node, list[int]] = {node: [] for node in nodes}
         self._taken: dict[Node, list[int]] = {node: [] for node in nodes}
         self._cost = {node: [0, 0] for node in nodes}
         for i, signal in enumerate(signals):
-            self._given[signal.source].append(i)
+            self._stated[signal.source].append(i)
             for target in signal.targets:
                 self._taken[target].append(i)
                 self._cost[target][not signal.flows] += 1
@@ -111,7 +111,7 @@ class _Search(Generic[Node]):
         if node in self._done or entry != self._key(node):
             return None
         self._done.add(node)
-        for i in (*self._given[node], *self._taken[node]):
+        for i in (*self._stated[node], *self._taken[node]):
             self._settle(i)
         for following in self._successors[node]:
             self._waits_for[following] -= 1
@@ -133,5 +133,5 @@ class _Search(Generic[Node]):
 
     def _key(self, node: Node) -> tuple[int, int, int, int, int]:
         flowing, constant = self._cost[node]
-        reach = sum(len(self._signals[i].targets) for i in self._given[node])
+        reach = sum(len(self._signals[i].targets) for i in self._stated[node])
         return self._rank[node], flowing, constant, -reach, self._place[node]

@@ -27,7 +27,7 @@ _DISTANCE = "distance"
 """Output of an odometer that counts the way of the wheel [m]."""
 STANDING = 0.5
 """Below this speed [m/s] an error in metres has no running time worth the name."""
-SAME = 1e-9  # times this close, relative to their size, are one
+EQUAL_WITHIN = 1e-9  # times this close, relative to their size, are one
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +164,7 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
     times = np.array([event.delivered_at for event in telegrams])
     rows = rows_before(result.time, times)
     speed = recorded(result, spec.true_speed)
-    judged = np.flatnonzero(times[1:] >= spec.evaluate_after) + 1
+    evaluated = np.flatnonzero(times[1:] >= spec.evaluate_after) + 1
     gaps = [
         Gap(
             telegrams[i - 1].identity,
@@ -174,27 +174,27 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
             float(abs(place[rows[i]] - telegrams[i - 1].true_position)),
             nan if speed is None else float(speed[rows[i]]),
         )
-        for i in judged
+        for i in evaluated
     ]
-    errors = _errors_at(result, spec, rows, judged, place)
+    errors = _errors_at(result, spec, rows, evaluated, place)
     labels = {name: PLAIN_ODOMETER if name == PLAIN_ODOMETER else label(spec, name) for name in errors}
     return GapErrors(gaps, errors, labels)
 
 
 def _errors_at(
-    result: Result, spec: ReportSpec, rows: np.ndarray, judged: np.ndarray, place: np.ndarray
+    result: Result, spec: ReportSpec, rows: np.ndarray, evaluated: np.ndarray, place: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Position errors at the end of the judged gaps [m], of each observer and of the plain odometer."""
     errors: dict[str, np.ndarray] = {}
     for observer in spec.observers:
         error = estimation_error(result, spec, observer, "position")
         if error is not None:
-            errors[observer] = np.where(np.isnan(error[rows[judged]]), inf, error[rows[judged]])
+            errors[observer] = np.where(np.isnan(error[rows[evaluated]]), inf, error[rows[evaluated]])
     counted = _odometer_way(result, spec)
     if counted is not None:
         with np.errstate(invalid="ignore"):
             ahead = counted[rows] - place[rows]
-            errors[PLAIN_ODOMETER] = ahead[judged] - ahead[judged - 1]
+            errors[PLAIN_ODOMETER] = ahead[evaluated] - ahead[evaluated - 1]
     return errors
 
 
@@ -205,7 +205,7 @@ def rows_before(time: np.ndarray, instants: np.ndarray) -> np.ndarray:
     Args:
         time: of the rows [s], not decreasing, shape (rows,). instants: of the events [s], shape (n,).
     """
-    close = SAME * np.maximum(1.0, np.abs(instants))
+    close = EQUAL_WITHIN * np.maximum(1.0, np.abs(instants))
     rows = np.searchsorted(time, instants - close)
     beyond = time[np.minimum(rows, len(time) - 1)] > instants + close
     return np.asarray(np.clip(np.where(beyond, rows - 1, rows), 0, len(time) - 1))

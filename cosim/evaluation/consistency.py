@@ -14,7 +14,7 @@ from cosim.evaluation.metrics import FEWEST_INSTANTS
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
-from fmu_observer.formulas.filtering.covariance_consistency import Consistency, judge, normalised_squares
+from fmu_observer.formulas.filtering.covariance_consistency import Consistency, evaluate, normalised_squares
 from fmus.tables.numbers import number
 
 Kind = Literal["NIS", "NEES", "error"]
@@ -171,7 +171,9 @@ def _of_one(result: Result, spec: ReportSpec, observer: str) -> Iterator[FilterC
     if nis is not None:
         rows = np.flatnonzero(np.diff(nis) != 0.0) + 1  # between samples it is held
         rows = rows[result.time[rows] >= spec.evaluate_after]
-        yield from _judged(observer, "NIS", "", result.time[rows], nis[rows], _degrees(result, observer, names)[rows])
+        yield from _evaluated(
+            observer, "NIS", "", result.time[rows], nis[rows], _degrees(result, observer, names)[rows]
+        )
     rows = _instants(result, spec)
     quantities = [name.removesuffix(STD) for name in names if name.endswith(STD)]
     errors: dict[str, np.ndarray] = {}
@@ -185,14 +187,14 @@ def _of_one(result: Result, spec: ReportSpec, observer: str) -> Iterator[FilterC
     if n > 1 and len(errors) == n and set(covariance) <= set(fields):
         P = np.stack([result[name][rows] for name in covariance], axis=1).reshape(-1, n, n)
         squares = normalised_squares(np.stack(list(errors.values()), axis=1), P)
-        yield from _judged(observer, "NEES", "", time, squares, np.full(len(time), float(n)))
+        yield from _evaluated(observer, "NEES", "", time, squares, np.full(len(time), float(n)))
     for quantity, error in errors.items():
         spread = result[f"{observer}.{quantity}{STD}"][rows]
         squares = normalised_squares(error[:, None], spread[:, None] ** 2)
-        yield from _judged(observer, "error", quantity, time, squares, np.ones(len(time)))
+        yield from _evaluated(observer, "error", quantity, time, squares, np.ones(len(time)))
 
 
-def _judged(
+def _evaluated(
     observer: str, kind: Kind, quantity: str, time: np.ndarray, squares: np.ndarray, degrees: np.ndarray
 ) -> Iterator[FilterConsistency]:
     known = ~np.isnan(squares)
@@ -201,7 +203,7 @@ def _judged(
     time, squares, degrees = time[known], squares[known], degrees[known]
     if kind != "NIS" and squares.mean() < _NOTHING_WRONG * degrees.mean():
         return  # the plant moves without noise as the filter expects it to
-    found = judge(squares, degrees, white=kind == "NIS")
+    found = evaluate(squares, degrees, white=kind == "NIS")
     yield FilterConsistency(observer, kind, quantity, time, squares, degrees, found)
 
 

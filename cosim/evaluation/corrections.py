@@ -11,7 +11,9 @@ from cosim.evaluation.roles import Quantity, estimation_error
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import BaliseRecord, Result
 
-SAME = 1e-9  # times this close, relative to their size, are one: an event table may have been written with fewer digits
+EQUAL_WITHIN = (
+    1e-9  # times this close, relative to their size, are one: an event table may have been written with fewer digits
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,7 @@ def event_rows(time: np.ndarray, instant: float) -> tuple[int, int] | None:
     """
     if not np.isfinite(instant):
         return None
-    close = SAME * max(1.0, abs(instant))
+    close = EQUAL_WITHIN * max(1.0, abs(instant))
     first = int(np.searchsorted(time, instant - close, "left"))
     beyond = int(np.searchsorted(time, instant + close, "right"))
     return (first, beyond - 1) if beyond - first >= 2 else None

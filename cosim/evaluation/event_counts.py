@@ -8,11 +8,21 @@ from dataclasses import dataclass
 
 from cosim.results.result import BaliseRecord
 
-_KNOWN_OUTCOMES = ("accepted", "replayed", "late", "doubted", "ignored", "rejected", "told", "repeated", "undelivered")
+_KNOWN_OUTCOMES = (
+    "accepted",
+    "replayed",
+    "late",
+    "doubted",
+    "ignored",
+    "rejected",
+    "notified",
+    "repeated",
+    "undelivered",
+)
 _UNDELIVERED = "undelivered"
-USED = ("accepted", "replayed", "late", "doubted", "told")
-"""Outcomes after which the telegram is part of the estimate; ``told`` is a receiver that reports no outcome."""
-_IN_WORDS = {"told": "delivered, outcome not reported"}
+USED = ("accepted", "replayed", "late", "doubted", "notified")
+"""Outcomes after which the telegram is part of the estimate; ``notified`` is a receiver that reports no outcome."""
+_IN_WORDS = {"notified": "delivered, outcome not reported"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -128,10 +128,10 @@ def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
     faults = [f for f in intervals(result.time, true) if f[0] >= start]
     indicated = {observer: estimate(result, observer, spec.detection) for observer in spec.observers}
     seen = [o for o in indicated if indicated[o] is not None or estimate(result, o, "position") is not None]
-    return [_judged(result, spec, observer, indicated[observer], faults, start) for observer in seen]
+    return [_evaluated(result, spec, observer, indicated[observer], faults, start) for observer in seen]
 
 
-def _judged_detections(
+def _evaluated_detections(
     faults: Sequence[Interval],
     detections: Sequence[Interval],
     end: float,
@@ -236,13 +236,13 @@ def clopper_pearson(count: int, trials: int, level: float = LEVEL) -> Interval:
     return low, high
 
 
-def _judged(
+def _evaluated(
     result: Result, spec: ReportSpec, observer: str, indicated: np.ndarray | None, faults: list[Interval], start: float
 ) -> FaultDetection:
     end = float(result.time[-1])
     detections = [] if indicated is None else [d for d in intervals(result.time, indicated) if d[1] > start]
     begun = [d for d in detections if d[0] >= start or any(d[1] > a for a, _ in faults)]
-    starts, ends, false = _judged_detections(faults, begun, end, delay_limit=spec.delay_limit)
+    starts, ends, false = _evaluated_detections(faults, begun, end, delay_limit=spec.delay_limit)
     inside = sum(max(0.0, min(b, d) - max(a, c)) for a, b in faults for c, d in begun)
     outside = sum(d - max(c, start) for c, d in begun) - inside
     return FaultDetection(

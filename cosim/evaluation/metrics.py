@@ -92,7 +92,7 @@ def _instants(steps: np.ndarray) -> int:
     return int(np.count_nonzero(steps > 0.0)) + 1
 
 
-def judged_size(time: np.ndarray, error: np.ndarray) -> _ErrorSize:
+def evaluated_size(time: np.ndarray, error: np.ndarray) -> _ErrorSize:
     """As `error_size`; NaN where there are fewer than `FEWEST_INSTANTS` instants.
 
     Args:
@@ -133,8 +133,8 @@ def _one(result: Result, spec: ReportSpec, observer: str, phase: Phase) -> Phase
     return PhaseMetrics(
         observer,
         phase.name,
-        None if speed is None else judged_size(result.time[rows], speed[rows]),
-        None if position is None else judged_size(result.time[rows], position[rows]),
+        None if speed is None else evaluated_size(result.time[rows], speed[rows]),
+        None if position is None else evaluated_size(result.time[rows], position[rows]),
         spec.published.get(observer, {}).get(phase.name),
         spec.independent.get(observer, {}).get(phase.name),
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.evaluation.corrections import Corrections, corrections, used_by
 from cosim.evaluation.indicators import on_share
-from cosim.evaluation.metrics import FEWEST_INSTANTS, error_size, instants, judged_size, within
+from cosim.evaluation.metrics import FEWEST_INSTANTS, error_size, evaluated_size, instants, within
 from cosim.evaluation.roles import coupler_force, estimate, phases, recorded
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
@@ -92,7 +92,7 @@ def _rms(
         return None
     rows = within(result.time, phase, spec.evaluate_after)
     with np.errstate(invalid="ignore", over="ignore"):  # inf - inf: diverged
-        rms = judged_size(result.time[rows], believed[rows] - true[rows]).rms
+        rms = evaluated_size(result.time[rows], believed[rows] - true[rows]).rms
     return None if isnan(rms) else rms
 
 
@@ -101,5 +101,5 @@ def _around(made: Corrections, start: float, end: float) -> tuple[float | None, 
     inside = (made.time >= start) & (made.time <= end)
     if not inside.any():
         return None, None
-    same_weight = np.zeros(int(inside.sum()))
-    return error_size(same_weight, made.before[inside]).rms, error_size(same_weight, made.after[inside]).rms
+    equal_weight = np.zeros(int(inside.sum()))
+    return error_size(equal_weight, made.before[inside]).rms, error_size(equal_weight, made.after[inside]).rms

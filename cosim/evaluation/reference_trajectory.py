@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.errors import ScenarioError
-from fmu_observer.formulas.filtering.covariance_consistency import Consistency, judge
+from fmu_observer.formulas.filtering.covariance_consistency import Consistency, evaluate
 from fmu_observer.formulas.filtering.kalman import integrated_noise
 from fmu_observer.formulas.filtering.smoothing import extended_pass, smooth
 
@@ -117,7 +117,7 @@ def reference_trajectory(
     used = int(passed.degrees.sum())
     balises = int(np.count_nonzero(np.isfinite(samples[:, 1])))
     known = ~np.isnan(passed.nis)
-    found = judge(passed.nis[known][3:], passed.degrees[known][3:].astype(float), white=True)
+    found = evaluate(passed.nis[known][3:], passed.degrees[known][3:].astype(float), white=True)
     there = int(np.isfinite(samples).sum())
     return ReferenceTrajectory(
         instants, smoothed.estimates, smoothed.deviations, len(time), there - used, balises, found

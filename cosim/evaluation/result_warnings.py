@@ -10,7 +10,7 @@ from math import inf
 import numpy as np
 
 from cosim.evaluation.consistency import consistency_warnings
-from cosim.evaluation.metrics import FEWEST_INSTANTS, instants, judged_size, within
+from cosim.evaluation.metrics import FEWEST_INSTANTS, evaluated_size, instants, within
 from cosim.evaluation.roles import estimation_error, label, phases, recorded
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.evaluation.summary_entries import list_entry
@@ -61,7 +61,7 @@ def all_warnings(result: Result, spec: ReportSpec) -> list[str]:
 def _standing(result: Result, spec: ReportSpec, moving: np.ndarray) -> Iterator[str]:
     if not len(moving):
         yield (
-            f"The train never moves: {spec.true_speed} stays below {_STANDSTILL:g} m/s up to {_given(result.time[-1])} "
+            f"The train never moves: {spec.true_speed} stays below {_STANDSTILL:g} m/s up to {_text(result.time[-1])} "
             "s. Errors beside it say nothing; let the run go on, or have something drive the train."
         )
 
@@ -73,7 +73,7 @@ def _empty_phases(result: Result, spec: ReportSpec) -> Iterator[str]:
     empty = [phase for phase, count in counts.items() if count < FEWEST_INSTANTS]
     unreached = [phase for phase in empty if max(phase.start, spec.evaluate_after) >= reached]
     if unreached:
-        yield f"Not reached, since the run ends at {_given(reached)} s: {_named(unreached, spec)}."
+        yield f"Not reached, since the run ends at {_text(reached)} s: {_named(unreached, spec)}."
     for phase in empty:
         if phase not in unreached:
             yield (
@@ -89,7 +89,7 @@ def _after_the_journey(result: Result, spec: ReportSpec, moving: np.ndarray) -> 
     ended = float(result.time[moving[-1] + 1])
     late = [p for p in phases(result, spec) if ended <= max(p.start, spec.evaluate_after) < result.time[-1]]
     if late:
-        yield f"The train stands from {_given(ended)} s on, so these phases show no journey: {_named(late, spec)}."
+        yield f"The train stands from {_text(ended)} s on, so these phases show no journey: {_named(late, spec)}."
 
 
 def largest_tolerable(result: Result, spec: ReportSpec) -> float:
@@ -101,7 +101,7 @@ def largest_tolerable(result: Result, spec: ReportSpec) -> float:
     speed, settled = recorded(result, spec.true_speed), result.time >= spec.evaluate_after
     if speed is None or not np.any(settled):
         return inf
-    return max(judged_size(result.time[settled], speed[settled]).max_abs, _STANDSTILL)
+    return max(evaluated_size(result.time[settled], speed[settled]).max_abs, _STANDSTILL)
 
 
 def _worse_than_none(result: Result, spec: ReportSpec) -> Iterator[str]:
@@ -112,7 +112,7 @@ def _worse_than_none(result: Result, spec: ReportSpec) -> Iterator[str]:
         error = estimation_error(result, spec, observer, "speed")
         if error is None:
             continue
-        largest = judged_size(result.time[settled], error[settled]).max_abs
+        largest = evaluated_size(result.time[settled], error[settled]).max_abs
         if largest > fastest:
             size = f"up to {number(largest)} m/s" if np.isfinite(largest) else "without bound"
             yield (
@@ -124,10 +124,10 @@ def _worse_than_none(result: Result, spec: ReportSpec) -> Iterator[str]:
 
 def _named(chosen: Sequence[Phase], spec: ReportSpec) -> str:
     late = {
-        p: f", judged from {_given(spec.evaluate_after)} s on" if spec.evaluate_after > p.start else "" for p in chosen
+        p: f", judged from {_text(spec.evaluate_after)} s on" if spec.evaluate_after > p.start else "" for p in chosen
     }
-    return ", ".join(f"{p.name} ({_given(p.start)} to {_given(p.end)} s{text})" for p, text in late.items())
+    return ", ".join(f"{p.name} ({_text(p.start)} to {_text(p.end)} s{text})" for p, text in late.items())
 
 
-def _given(time: float) -> str:
+def _text(time: float) -> str:
     return f"{time:.6g}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cosim.expectations.judge import judge
-from cosim.expectations.judged import Judged
+from cosim.expectations.evaluate import evaluate
+from cosim.expectations.evaluated import Evaluated
 
-__all__ = ["Judged", "judge"]
+__all__ = ["Evaluated", "evaluate"]

@@ -43,9 +43,9 @@ class Before:
     @property
     def observers(self) -> list[str]:
         """Those of the report, or else all components that are named as observers."""
-        given = self.report.observers
-        if given is not None:
-            return list(given)
+        stated = self.report.observers
+        if stated is not None:
+            return list(stated)
         return [n for n, t in self.tables.items() if t.observer is not None or t.filter is not None]
 
     def demand_within(self, key: str, value: float | None) -> None:
@@ -90,7 +90,7 @@ class Before:
         with _as_scenario_error():
             self.components[component].variable(output, "output")
 
-    def demand_same_dimension(self, *signals: str) -> None:
+    def demand_equal_dimension(self, *signals: str) -> None:
         """Signals exist, and can be compared.
 
         Args:

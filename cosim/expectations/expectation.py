@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cosim.expectations.judged import Judged
-from cosim.expectations.judged_run import JudgedRun
+from cosim.expectations.evaluated import Evaluated
+from cosim.expectations.evaluated_run import EvaluatedRun
 from cosim.toml_table import TomlTable
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Expectation(TomlTable):
         return self
 
     @abstractmethod
-    def judge(self, run: JudgedRun) -> list[Judged]:
+    def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """Hold a run against it.
 
         Args:
@@ -72,10 +72,10 @@ class WindowExpectation(Expectation):
 
     def prepare(self, before: Before) -> Self:
         """The window lies within the run, and holds at least one point that is recorded."""
-        before.demand_window(self.start, self.end, self.first_judged(before))
+        before.demand_window(self.start, self.end, self.first_evaluated(before))
         return self
 
-    def first_judged(self, before: Before) -> float:
+    def first_evaluated(self, before: Before) -> float:
         """Where the window begins if ``from`` is not given [s].
 
         Args:
@@ -121,5 +121,5 @@ class PairExpectation(WindowExpectation):
     def prepare(self, before: Before) -> Self:
         """Both signals exist, and have one dimension."""
         super().prepare(before)
-        before.demand_same_dimension(self.signal, self.reference)
+        before.demand_equal_dimension(self.signal, self.reference)
         return self

@@ -52,10 +52,10 @@ def held(time: np.ndarray, values: np.ndarray, start: float, end: float) -> tupl
     return np.maximum(time[first:last], start), values[first:last]
 
 
-def threshold_of(signal: str, given: float | None) -> float:
+def threshold_of(signal: str, stated: float | None) -> float:
     """The threshold of an indicator, above which it is on.
 
     Args:
-        signal: its name. given: threshold that was given, or None.
+        signal: its name. stated: threshold that was stated, or None.
     """
-    return given if given is not None else shipped_threshold(signal) or BETWEEN_0_AND_1
+    return stated if stated is not None else shipped_threshold(signal) or BETWEEN_0_AND_1

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from cosim.evaluation.metrics import error_size, instants
-from cosim.expectations.judged import Judged, at, given, with_unit
-from cosim.expectations.judged_run import TimeWindow
+from cosim.expectations.evaluated import Evaluated, at, with_unit, written
+from cosim.expectations.evaluated_run import TimeWindow
 
 
 def difference(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -24,7 +24,7 @@ def difference(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
         return np.asarray(values - reference)
 
 
-def judge_sizes(name: str, item: Any, window: TimeWindow, error: np.ndarray, unit: str) -> list[Judged]:
+def evaluate_sizes(name: str, item: Any, window: TimeWindow, error: np.ndarray, unit: str) -> list[Evaluated]:
     """Largest size and root mean square of an error, as far as they are limited.
 
     Args:
@@ -38,16 +38,23 @@ def judge_sizes(name: str, item: Any, window: TimeWindow, error: np.ndarray, uni
         limit = getattr(item, what)
         if limit is None:
             continue
-        judged: dict[str, Any] = {"name": name.format(f", {what}"), "check": item.check, "limit": limit, "unit": unit}
+        evaluated: dict[str, Any] = {
+            "name": name.format(f", {what}"),
+            "check": item.check,
+            "limit": limit,
+            "unit": unit,
+        }
         nothing = _nothing_measured(window, time, shown, window.fewest)
         if nothing is not None:
-            found.append(Judged(passed=False, **judged, **nothing))
+            found.append(Evaluated(passed=False, **evaluated, **nothing))
             continue
         when = float(time[np.argmax(np.abs(shown))]) if what == "max" else nan
-        text = f"{with_unit(measured, unit)}{at(when)}, allowed {given(limit, unit)}"
+        text = f"{with_unit(measured, unit)}{at(when)}, allowed {written(limit, unit)}"
         passed = measured <= limit
         text += f"; {window.unreached}" if passed and window.broken else ""
-        found.append(Judged(passed=passed and not window.broken, measured=measured, when=when, text=text, **judged))
+        found.append(
+            Evaluated(passed=passed and not window.broken, measured=measured, when=when, text=text, **evaluated)
+        )
     return found
 
 
@@ -61,7 +68,7 @@ def bounded(
     high: float,
     *,
     last: bool = False,
-) -> Judged:
+) -> Evaluated:
     """Whether values lie between two bounds, one of which may be infinite.
 
     Args:
@@ -71,20 +78,20 @@ def bounded(
     unit = base["unit"]
     nothing = _nothing_measured(window, time, values, 1 if last else window.fewest)
     if nothing is not None:
-        return Judged(name, passed=False, limit=low if high == inf else high, **base, **nothing)
+        return Evaluated(name, passed=False, limit=low if high == inf else high, **base, **nothing)
     excess = np.maximum(values - high, low - values)
     row = int(np.argmax(excess))
     measured, when = float(values[row]), float(time[row])
     passed = bool(low <= measured <= high)
-    allowed = f"at least {given(low, unit)}" if high == inf else f"at most {given(high, unit)}"
+    allowed = f"at least {written(low, unit)}" if high == inf else f"at most {written(high, unit)}"
     if last:
-        allowed = f"{given(low)} to {given(high, unit)}"
+        allowed = f"{written(low)} to {written(high, unit)}"
     limit = low if high == inf or measured < low else high
     text = f"{with_unit(measured, unit)}{at(when)}, expected {allowed}"
     text += f"; {window.unreached}" if passed and window.broken else ""
     if last and window.broken:
         text, passed = f"{with_unit(measured, unit)} so far, expected {allowed}; {window.unreached}", False
-    return Judged(
+    return Evaluated(
         name, passed=passed and not window.broken, measured=measured, limit=limit, when=when, text=text, **base
     )
 
@@ -96,7 +103,7 @@ def _nothing_measured(window: TimeWindow, time: np.ndarray, values: np.ndarray, 
     count = instants(time)
     if count < fewest:
         rows = f"only {count} instant{'s' * (count > 1)}, too few to judge:" if count else "nothing measured: no row"
-        between = f"{rows} between {given(window.start)} and {given(min(window.end, window.reached))} s"
+        between = f"{rows} between {written(window.start)} and {written(min(window.end, window.reached))} s"
         return {"text": window.unreached if window.reached < window.start else between}
     bad = np.flatnonzero(~np.isfinite(values))
     if not len(bad):
@@ -106,5 +113,5 @@ def _nothing_measured(window: TimeWindow, time: np.ndarray, values: np.ndarray, 
     return {
         "measured": inf,
         "when": first,
-        "text": f"{what} at {given(first)} s; {len(bad)} of {len(values)} rows are not finite",
+        "text": f"{what} at {written(first)} s; {len(bad)} of {len(values)} rows are not finite",
     }

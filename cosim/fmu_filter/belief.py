@@ -168,9 +168,9 @@ class ExtendedFilter(FmuFilter):
             slopes = self._directional.slopes([self.model.outputs[i] for i in chosen])
             return self._corrected(belief, kalman.correct(x, belief.P, y - expected, slopes, R), y - expected)
         points, apart = _about(x, steps)
-        looks = self.model.outputs_at(t, points, u, chosen)
-        innovation = y - looks[:, 0]
-        return self._corrected(belief, kalman.correct(x, belief.P, innovation, _slopes(looks, apart), R), innovation)
+        readings = self.model.outputs_at(t, points, u, chosen)
+        innovation = y - readings[:, 0]
+        return self._corrected(belief, kalman.correct(x, belief.P, innovation, _slopes(readings, apart), R), innovation)
 
 
 class UnscentedFilter(FmuFilter):
@@ -199,9 +199,9 @@ class UnscentedFilter(FmuFilter):
         """The belief after a measurement; arguments as for `FmuFilter`."""
         w, chosen = self._weights, list(seen)
         points = unscented.sigma_points(belief.x, _root(belief.P), w.spread)
-        states, looks = _scattered(points), _scattered(self.model.outputs_at(t, points, u, chosen))
-        found = unscented.correct(belief.x, belief.P, states, looks, y, R, w)
-        return self._corrected(belief, found, y - unscented.mean(looks, w))
+        states, readings = _scattered(points), _scattered(self.model.outputs_at(t, points, u, chosen))
+        found = unscented.correct(belief.x, belief.P, states, readings, y, R, w)
+        return self._corrected(belief, found, y - unscented.mean(readings, w))
 
 
 def _about(x: Array, steps: Array) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from cosim.components.description import open_fmu
 from cosim.components.loading import load_fmu
 from cosim.errors import nearest
 from cosim.fmu_filter.belief import ExtendedFilter, FmuFilter, Noises, UnscentedFilter
-from cosim.fmu_filter.journal import SAME, FilterJournal
+from cosim.fmu_filter.journal import EQUAL_WITHIN, FilterJournal
 from cosim.fmu_filter.many import EnsembleFilter, FmuParticleFilter
 from cosim.fmu_filter.settings import FilterTable
 from cosim.fmu_model.exchange import ExchangeModel
@@ -116,7 +116,7 @@ class FmuFilterModel:
         journal.predict(dt, self._u)
         now = t + dt
         period = table.sample_period
-        if self._seen and (period is None or now >= self._origin + self._next * period - SAME):
+        if self._seen and (period is None or now >= self._origin + self._next * period - EQUAL_WITHIN):
             y = np.array([inputs[name] for name in self._measured_inputs], dtype=float)
             finite = np.isfinite(y)  # NaN is a missing measurement
             self._missed += int(np.count_nonzero(~finite))
@@ -125,7 +125,7 @@ class FmuFilterModel:
                 seen = [self._seen[i] for i in known]
                 journal.correct(now, self._u, seen, y[known], self._R[np.ix_(known, known)])
             if period is not None:
-                self._next = int(np.floor((now - self._origin) / period + SAME / period)) + 1
+                self._next = int(np.floor((now - self._origin) / period + EQUAL_WITHIN / period)) + 1
         return self._values(now)
 
     def balise(self, stamp: float, position: float, location_accuracy: float = 0.0) -> bool | dict[str, float]:
@@ -177,7 +177,7 @@ class FmuFilterModel:
         """At the first step: its length [s] is no multiple of the one at which the states were looked at before."""
         self._unchecked = False
         usual = usual_step(self._model)
-        if abs(dt / usual - max(1, round(dt / usual))) > SAME:
+        if abs(dt / usual - max(1, round(dt / usual))) > EQUAL_WITHIN:
             check_states(self._model, dt)
 
     def _values(self, t: float) -> dict[str, float]:
@@ -281,9 +281,9 @@ def _place(model: SealedModel, what: str, names: tuple[str, ...], name: str) -> 
     return names.index(name)
 
 
-def _by_name(model: SealedModel, what: str, names: tuple[str, ...], given: Mapping[str, float]) -> Array:
+def _by_name(model: SealedModel, what: str, names: tuple[str, ...], stated: Mapping[str, float]) -> Array:
     found = np.zeros(len(names))
-    for name, value in given.items():
+    for name, value in stated.items():
         found[_place(model, what, names, name)] = value
     return found
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cosim.fmu_filter.belief import FmuBelief, FmuFilter
 
 Array = NDArray[np.float64]
-SAME = 1e-9
+EQUAL_WITHIN = 1e-9
 """Instants within this are one [s]."""
 
 
@@ -55,7 +55,7 @@ class FilterJournal:
             h: how far [s]. u: inputs, held, shape (m,).
         """
         self._done(_JournalEntry(self.belief, self.t, u.copy(), h=h))
-        oldest = self.t - self._horizon - SAME
+        oldest = self.t - self._horizon - EQUAL_WITHIN
         while self._entries and self._entries[0].t + self._entries[0].h < oldest:
             self._entries.pop(0)
 
@@ -69,16 +69,18 @@ class FilterJournal:
         Returns:
             Whether it was taken; one from before the horizon is not.
         """
-        if stamp >= self.t - SAME:
+        if stamp >= self.t - EQUAL_WITHIN:
             self._done(_JournalEntry(self.belief, self.t, u.copy(), seen=tuple(seen), y=y.copy(), R=R))
             return True
-        place = next((i for i, e in enumerate(self._entries) if e.h > 0.0 and e.t <= stamp < e.t + e.h - SAME), None)
+        place = next(
+            (i for i, e in enumerate(self._entries) if e.h > 0.0 and e.t <= stamp < e.t + e.h - EQUAL_WITHIN), None
+        )
         if place is None:
             return False
         split, rest = self._entries[place], self._entries[place + 1 :]
         del self._entries[place:]
         self.belief, self.t = split.before, split.t
-        if stamp > split.t + SAME:
+        if stamp > split.t + EQUAL_WITHIN:
             self._do(replace(split, h=stamp - split.t))
         self._do(_JournalEntry(self.belief, stamp, split.u, seen=tuple(seen), y=y.copy(), R=R))
         self._do(replace(split, h=split.t + split.h - stamp))

@@ -50,8 +50,8 @@ class EnsembleFilter(FmuFilter):
         """The belief after a measurement; arguments as for `FmuFilter`."""
         members, count = _points(belief), belief.count + 1
         chosen = list(seen)
-        looks = self.model.outputs_at(t, members, u, chosen)
-        found = particles.correct_members(members, looks, y, R, self._draws(2 * count, len(y)))
+        readings = self.model.outputs_at(t, members, u, chosen)
+        found = particles.correct_members(members, readings, y, R, self._draws(2 * count, len(y)))
         return self._summed(replace(belief, points=found.members, nis=float(found.nis), degrees=len(y), count=count))
 
     def _draws(self, index: int, rows: int) -> Array:

@@ -197,7 +197,7 @@ class CoSimulationModel(SealedModel):
     _quick: _QuickPoints | None = None
     """Restarts as one call each, where the order of the calls is fixed."""
     _steps: _Batch
-    _looks: _Batch
+    _readings: _Batch
 
     def advance(self, t: float, h: float) -> None:
         """Go on by one communication step, inputs held.
@@ -222,7 +222,7 @@ class CoSimulationModel(SealedModel):
         if self._quick is None or self._quick.hangs_in:
             return super().outputs_at(t, points, u, chosen)
         try:
-            found = self._looks(t, 0.0, self._values_of(points, u), self._slowly)
+            found = self._readings(t, 0.0, self._values_of(points, u), self._slowly)
         except SlaveError as error:
             raise self._in_words(error) from error
         return found.T if chosen is None else found.take(chosen, axis=1).T
@@ -284,4 +284,4 @@ class CoSimulationModel(SealedModel):
         if instance.has_event_mode or self.way != "restart":
             return  # initialisation ends in calls that depend on what the FMU answers, or is followed by others
         self._quick = quick = _QuickPoints(instance, FAR, self._written, self._write_values)
-        self._steps, self._looks = quick.batch(self.states, step=True), quick.batch(self.outputs, step=False)
+        self._steps, self._readings = quick.batch(self.states, step=True), quick.batch(self.outputs, step=False)

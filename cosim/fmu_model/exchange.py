@@ -282,14 +282,14 @@ class ExchangeModel(_ContinuousModel):
         columns = self.called(lambda: [ask(unknowns, [name], [1.0]) for name in self.states])
         return np.array(columns).T.reshape(len(unknowns), len(self.states))
 
-    def _own_states(self, given: Sequence[str] | None) -> Sequence[str]:
+    def _own_states(self, stated: Sequence[str] | None) -> Sequence[str]:
         own = declared_states(self.instance)
-        if given is not None and not given:
+        if stated is not None and not stated:
             return ()  # it starts where the FMU itself does
-        if given is not None and set(given) != set(own):
+        if stated is not None and set(stated) != set(own):
             raise FmuModelError(
                 f"{self.path}: in model exchange all states are set at once: {', '.join(own)}; given are: "
-                f"{', '.join(given)}."
+                f"{', '.join(stated)}."
             )
         return super()._own_states(None)
 

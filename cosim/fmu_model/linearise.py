@@ -294,9 +294,9 @@ def _simulated(model: SealedModel, t: float, u: Array, step: float) -> Array:
     return np.array([float(rows[name][-1]) for name in model.states])
 
 
-def _filled(model: SealedModel, what: str, names: tuple[str, ...], values: Array, given: Mapping[str, float]) -> Array:
+def _filled(model: SealedModel, what: str, names: tuple[str, ...], values: Array, stated: Mapping[str, float]) -> Array:
     found = dict(zip(names, values.tolist(), strict=True))
-    for name, value in given.items():
+    for name, value in stated.items():
         if name not in found:
             raise FmuModelError(f"{model.path}: no {what} {name!r}; {nearest(name, found)}")
         found[name] = float(value)

@@ -254,8 +254,8 @@ class SealedModel(ABC):
         """End the instance and remove its files."""
         self._finalizer()
 
-    def _chosen(self, given: Sequence[str] | None, own: Sequence[str], what: str) -> Sequence[str]:
-        if given is None:
+    def _chosen(self, stated: Sequence[str] | None, own: Sequence[str], what: str) -> Sequence[str]:
+        if stated is None:
             if what == "state" and not own:
                 raise FmuModelError(
                     f"{self.path}: its description declares no continuous state (no derivative of a variable). Name "
@@ -263,7 +263,7 @@ class SealedModel(ABC):
                     "estimate."
                 )
             return own
-        for name in given:
+        for name in stated:
             try:
                 self.instance.variables.element(name)
             except KeyError as error:
@@ -272,10 +272,10 @@ class SealedModel(ABC):
                 every = settable if what == "parameter" else [v.name for v in found]
                 hint = nearest(name, own or every)
                 raise FmuModelError(f"{self.path}: no {what} {name!r}; {hint}") from error
-        return given
+        return stated
 
-    def _own_states(self, given: Sequence[str] | None) -> Sequence[str]:
-        return self._chosen(given, declared_states(self.instance), "state")
+    def _own_states(self, stated: Sequence[str] | None) -> Sequence[str]:
+        return self._chosen(stated, declared_states(self.instance), "state")
 
     def _has_start(self, name: str) -> bool:
         """Whether a start value of a state may be set."""

@@ -81,7 +81,9 @@ def check_states(model: SealedModel, h: float, t: float = 0.0) -> _StateTrust:
             f"{model.path}: no state changes what follows ({', '.join(idle)}): the FMU does not start from the values "
             "given. No filter can move it; a particle filter over saved states only selects."
         )
-    return _StateTrust(model.way, all(same for _, same in seen), max(0.0, *(deviation for deviation, _ in seen)), idle)
+    return _StateTrust(
+        model.way, all(equal for _, equal in seen), max(0.0, *(deviation for deviation, _ in seen)), idle
+    )
 
 
 def _continued(model: SealedModel, rows: list[tuple[Array, Array]], k: int, t: float, h: float) -> tuple[float, bool]:

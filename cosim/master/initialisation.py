@@ -121,10 +121,10 @@ class _Settling:
     def _changed(self, previous: np.ndarray, tolerance: float = TOLERANCE) -> np.ndarray:
         values = self.plan.values
         size = np.maximum(np.abs(values), np.abs(previous))
-        same = (values == previous) | (np.isnan(values) & np.isnan(previous))
+        equal = (values == previous) | (np.isnan(values) & np.isnan(previous))
         with np.errstate(invalid="ignore"):
             settled = np.abs(values - previous) <= tolerance * size
-        moved: np.ndarray = ~(same | (settled & np.isfinite(size)))
+        moved: np.ndarray = ~(equal | (settled & np.isfinite(size)))
         return moved
 
     def _note(self, z: np.ndarray, g: np.ndarray) -> None:

@@ -149,7 +149,7 @@ class _Watch:
     def _keep(self, reason: str) -> None:
         """Keep what was computed, and say where."""
         note = json.loads(LAST_CALL.noted or "{}")
-        if "spare" in note:
+        if "fallback" in note:
             from cosim.results.salvage import salvage  # noqa: PLC0415 - only here is anything large needed
 
             print(salvage(note, reason), file=sys.stderr)

@@ -24,7 +24,7 @@ from cosim.simulation.scenario import Scenario
 from fmus.tables.table import Parts, Readable
 
 if TYPE_CHECKING:
-    from cosim.comparison.compare import Given
+    from cosim.comparison.compare import StatedTolerance
     from cosim.results.result import Result
 from collections.abc import Sequence
 from dataclasses import astuple
@@ -38,38 +38,38 @@ Verdict = Literal["bit-identical", "within tolerance", "differs"]
 CHUNK = 65536
 
 
-def _same_result(first: Result, second: Result) -> bool:
+def _equal_result(first: Result, second: Result) -> bool:
     """Whether tables, telegrams and packets agree in every bit.
 
     One NaN is as good as another, since text files keep no more of it.
     """
     return (
-        _same_table(first.table, second.table)
-        and _same_events(first.events, second.events)
-        and _same_events(first.packets, second.packets)
+        _equal_table(first.table, second.table)
+        and _equal_events(first.events, second.events)
+        and _equal_events(first.packets, second.packets)
     )
 
 
-def _same_table(first: np.ndarray, second: np.ndarray) -> bool:
+def _equal_table(first: np.ndarray, second: np.ndarray) -> bool:
     """Whether two tables have the same columns in the same order and the same bits in every row."""
     if first.dtype.names != second.dtype.names or first.shape != second.shape:
         return False
     names = first.dtype.names or ()
     return all(
-        _same_bits(first[name][start : start + CHUNK], second[name][start : start + CHUNK])
+        _equal_bits(first[name][start : start + CHUNK], second[name][start : start + CHUNK])
         for start in range(0, len(first), CHUNK)
         for name in names
     )
 
 
-def _same_events(first: Sequence[BaliseRecord | PacketRecord], second: Sequence[BaliseRecord | PacketRecord]) -> bool:
+def _equal_events(first: Sequence[BaliseRecord | PacketRecord], second: Sequence[BaliseRecord | PacketRecord]) -> bool:
     """Whether two lists of telegrams or packets are the same."""
     return len(first) == len(second) and all(
         list(map(_bits, astuple(a))) == list(map(_bits, astuple(b))) for a, b in zip(first, second, strict=True)
     )
 
 
-def _same_bits(first: np.ndarray, second: np.ndarray) -> bool:
+def _equal_bits(first: np.ndarray, second: np.ndarray) -> bool:
     a, b = np.ascontiguousarray(first).view(np.uint64), np.ascontiguousarray(second).view(np.uint64)
     return bool(np.all((a == b) | (np.isnan(first) & np.isnan(second))))
 
@@ -134,7 +134,7 @@ def rerun(
     *,
     out: str | Path | None = None,
     overrides: Mapping[str, Any] | None = None,
-    tolerance: Given | None = None,
+    tolerance: StatedTolerance | None = None,
     trust: bool = False,
     progress: Callable[[float, float], None] | None = None,
     warn: Callable[[str], None] | None = None,
@@ -167,7 +167,7 @@ def rerun(
     paths = {} if out is None else outcome.write(out)  # before anything can be wrong with the comparison
     result = _as_far_as(stored, outcome.result)
     comparison = compare(stored, result, tolerance, extra_fails=True)
-    identical = _same_result(stored, result)
+    identical = _equal_result(stored, result)
     verdict: Verdict = "bit-identical" if identical else "within tolerance" if comparison.equal else "differs"
     changes = [*edited, *_changes(manifest, outcome), *(f"set: {name} = {value}" for name, value in settings.items())]
     return Rerun(Path(directory), manifest, outcome, comparison, verdict, tuple(changes), paths, stored.failure)

@@ -43,9 +43,9 @@ def demand_vendor_files(item: pytest.Item) -> None:
     for marker in item.iter_markers("fmu_vendor"):
         if not marker.args:
             pytest.fail("the marker fmu_vendor needs a path: @pytest.mark.fmu_vendor('vendor.fmu')", pytrace=False)
-        for given in marker.args:
-            if (item.path.parent / given).is_file():
+        for stated in marker.args:
+            if (item.path.parent / stated).is_file():
                 continue
             if item.config.getoption("--fmu-vendor") == "require":
-                pytest.fail(f"the vendor file {given} is absent (--fmu-vendor=require)", pytrace=False)
-            pytest.skip(f"the vendor file {given} is absent")
+                pytest.fail(f"the vendor file {stated} is absent (--fmu-vendor=require)", pytrace=False)
+            pytest.skip(f"the vendor file {stated} is absent")

@@ -62,10 +62,10 @@ def baseline_folder(config: pytest.Config, test_file: Path) -> Path:
     Args:
         config: of the session. test_file: of the test.
     """
-    given = config.getoption("--fmu-baseline-dir") or config.getini("fmu_baseline_dir")
-    if not given:
+    stated = config.getoption("--fmu-baseline-dir") or config.getini("fmu_baseline_dir")
+    if not stated:
         return test_file.parent / "baselines" / test_file.stem
-    folder = config.rootpath / str(given)
+    folder = config.rootpath / str(stated)
     inside = test_file.is_relative_to(config.rootpath)
     return folder / (test_file.relative_to(config.rootpath) if inside else Path(test_file.name)).with_suffix("")
 

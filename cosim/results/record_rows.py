@@ -30,6 +30,8 @@ TELEGRAM_UNITS = {
 }
 _PACKET_KINDS = ("sent", "lost", "duplicate")
 _ESCAPES = {ord("%"): "%25", ord(";"): "%3B", ord("="): "%3D"}
+_FORMER_OUTCOMES = {"told": "notified"}
+"""How files written before version 9.3 name an outcome, and its name now."""
 
 
 def _outcomes_text(outcomes: Mapping[str, str]) -> str:
@@ -38,7 +40,7 @@ def _outcomes_text(outcomes: Mapping[str, str]) -> str:
 
 
 def parse_outcomes(text: str) -> dict[str, str]:
-    """The mapping that `_outcomes_text` wrote.
+    """The mapping that `_outcomes_text` wrote, with the outcomes of earlier versions under the names of today.
 
     Raises:
         ValueError: a part of `text` is not ``name=outcome``.
@@ -48,7 +50,7 @@ def parse_outcomes(text: str) -> dict[str, str]:
         name, equals, what = part.partition("=")
         if not equals:
             raise ValueError(f"Outcome {part!r} must read 'receiver=outcome'.")
-        outcomes[unquote(name)] = unquote(what)
+        outcomes[unquote(name)] = _FORMER_OUTCOMES.get(what, unquote(what))
     return outcomes
 
 

@@ -49,8 +49,8 @@ class BaliseRecord:
         method: localisation method that gave the stamp.
         time_bound: bound or estimate of the stamp's error [s], NaN where it is not known.
         outcomes: what became of it at each receiver: ``accepted``, ``replayed``, ``late``, ``rejected``,
-            ``doubted`` or ``ignored`` by a gate, ``told`` (it reports none), ``repeated`` (came before, with the same
-            identity and stamp, so not delivered again), or ``undelivered`` (on its way when the run ended).
+            ``doubted`` or ``ignored`` by a gate, ``notified`` (it reports none), ``repeated`` (came before, with
+            the same identity and stamp, so not delivered again), or ``undelivered`` (on its way when the run ended).
     """
 
     stamp: float

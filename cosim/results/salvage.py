@@ -20,29 +20,29 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
     """Keep what was computed.
 
     Args:
-        note: ``spare``: the folder that was streamed to; ``out``: that of the results, perhaps the same; ``formats`` of
-            its table. reason: why the run ended.
+        note: ``fallback``: the folder that was streamed to; ``out``: that of the results, perhaps the same; ``formats``
+            of its table. reason: why the run ended.
 
     Returns:
         What to say to the user.
     """
-    spare, out = Path(note["spare"]), Path(note["out"])
+    fallback, out = Path(note["fallback"]), Path(note["out"])
     try:
-        if not (spare / SUMMARY).exists() or not (spare / usual_file("npy")).exists():
+        if not (fallback / SUMMARY).exists() or not (fallback / usual_file("npy")).exists():
             return "Nothing had been computed yet."
-        _close_unfinished(spare, reason)
-        result = read_results(spare)
-        if spare != out:
+        _close_unfinished(fallback, reason)
+        result = read_results(fallback)
+        if fallback != out:
             write_results(result, out, note["formats"])
             remove_report(out)
             shutil.rmtree(out / "made_from", ignore_errors=True)
     except (CosimError, OSError, ValueError) as error:
-        return f"What was computed could not be brought to {out}: {error} It is in {spare}."
+        return f"What was computed could not be brought to {out}: {error} It is in {fallback}."
     finally:
-        if spare != out and not (spare / SUMMARY).exists():
-            shutil.rmtree(spare, ignore_errors=True)
-    if spare != out:
-        shutil.rmtree(spare, ignore_errors=True)
+        if fallback != out and not (fallback / SUMMARY).exists():
+            shutil.rmtree(fallback, ignore_errors=True)
+    if fallback != out:
+        shutil.rmtree(fallback, ignore_errors=True)
     return f"What was computed is kept: {len(result.table)} rows in {out}. To see it: cosim report {out}"
 
 

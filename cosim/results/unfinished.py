@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-SPARE = ".unfinished"
+UNFINISHED = ".unfinished"
 """The folder, within that of the results, to which a run is streamed in case its process dies."""
 
 DID_NOT_END = "the run did not end"

@@ -77,9 +77,9 @@ def _unused_balises(
             continue
         others = [event.name for event in system.triggered_events if event.name != BALISE_EVENT]
         read = [signal.name for signal in system.inputs if signal.name.endswith("_position")]
-        given = [event for event in others if is_wired(links, name, event)]
-        given += [signal for signal in read if any(target == f"{name}.{signal}" for _, target, *_ in links)]
-        if not given:
+        wired = [event for event in others if is_wired(links, name, event)]
+        wired += [signal for signal in read if any(target == f"{name}.{signal}" for _, target, *_ in links)]
+        if not wired:
             waits = " or ".join([*(f"event {event!r}" for event in others), *(f"input {s!r}" for s in read)])
             warnings.append(
                 f"{name}: balises do not act on it, for their gain is 0 and nothing is connected "

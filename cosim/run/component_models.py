@@ -284,10 +284,12 @@ def _chosen_options(factory: type[HybridSystem], options: Mapping[str, Any], whe
                 f"{where}: {factory.name} has no option {key!r}; {nearest(key, factory.option_choices)}"
             )
         choices = factory.option_choices[key]
-        same = [choice for choice in choices if choice == value and isinstance(choice, bool) == isinstance(value, bool)]
-        if choices and not same and not (isinstance(value, str) and value in choices):
+        equal = [
+            choice for choice in choices if choice == value and isinstance(choice, bool) == isinstance(value, bool)
+        ]
+        if choices and not equal and not (isinstance(value, str) and value in choices):
             raise ScenarioError(f"{where}: option {key} = {value!r} of {factory.name}; choose {_legal(choices)}.")
-        chosen[key] = same[0] if same else value
+        chosen[key] = equal[0] if equal else value
     return chosen
 
 
@@ -307,7 +309,7 @@ def _legal(choices: Sequence[Any]) -> str:
     return f"from {', '.join(map(repr, choices))}{own}"
 
 
-def given_parameters(table: ComponentTable, system: HybridSystem) -> dict[str, Any]:
+def stated_parameters(table: ComponentTable, system: HybridSystem) -> dict[str, Any]:
     """What the table of a component says of the parameters of its system, by name.
 
     Args:
@@ -323,4 +325,4 @@ def values_in_use(table: ComponentTable, system: Any) -> Any:
     Args:
         table: of the component. system: the hybrid system that it names.
     """
-    return system.unpack_parameters(parameter_values(system, given_parameters(table, system), table.preset))
+    return system.unpack_parameters(parameter_values(system, stated_parameters(table, system), table.preset))

@@ -18,7 +18,7 @@ from cosim.diagnostics.messages import FAULTS, in_order
 from cosim.errors import CosimError
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.spec import ReportSpec
-from cosim.expectations.judge import judge
+from cosim.expectations.evaluate import evaluate
 from cosim.process.interruption import Interruption
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.si import InFormerUnits, in_si
@@ -30,7 +30,7 @@ from cosim.run.ready import Ready
 from cosim.run.remarks import Remarks
 from cosim.run.services import Services
 from cosim.run.signal_roles import report_spec
-from cosim.run.summary import judged_summary, run_summary
+from cosim.run.summary import evaluated_summary, run_summary
 from cosim.structure.divergence import explained_failure
 from fmu_observer.annotated_variable import declared_warnings
 from plant_models.hybrid.missing import MISSED_SAMPLES
@@ -206,7 +206,7 @@ def execute(
     messages = in_order(component.messages for component in ready.coupled.components.values())
     result = replace(result, summary=summary, failure=failure, messages=messages)
     outcome = Outcome(result, spec, tuple(ready.task.table.report.tables))
-    return outcome.with_summary(expectations=[judged.to_data() for judged in judge(ready.task.table, outcome)])
+    return outcome.with_summary(expectations=[evaluated.to_data() for evaluated in evaluate(ready.task.table, outcome)])
 
 
 def _step(ready: Ready, interruption: Interruption) -> _Executed:
@@ -252,7 +252,7 @@ def _summary(
     remarks.note(*_missed_samples(ready.coupled.components))
     found = _balise_summary(ready.services, gap)
     found |= {"certificates": certificates, "premises": premises, "warnings": remarks.warnings, "notes": remarks.notes}
-    found |= judged_summary(result, spec)
+    found |= evaluated_summary(result, spec)
     if ready.coupled.network is not None:
         found["network"] = network_summary(ready.coupled.network, result.packets, start, float(result.time[-1]))
     return found

@@ -66,10 +66,10 @@ def _checked(layout: TrackLayout, table: BalisesTable) -> TrackLayout:
 
 def _recorded(table: BalisesTable, start: float, folder: Path) -> RecordedLayout:
     """The telegrams of an earlier run; what happens to telegrams has happened to them already."""
-    given = [key for key in _DELIVERED_AS_RECORDED if key in table.model_fields_set]
-    given += ["method"] if table.method != "auto" else []
-    if given:
-        raise ScenarioError(f"layout 'recorded' delivers the telegrams as recorded; leave out {', '.join(given)}.")
+    stated = [key for key in _DELIVERED_AS_RECORDED if key in table.model_fields_set]
+    stated += ["method"] if table.method != "auto" else []
+    if stated:
+        raise ScenarioError(f"layout 'recorded' delivers the telegrams as recorded; leave out {', '.join(stated)}.")
     return read_layout((folder / str(table.file)).resolve()).later(start)
 
 

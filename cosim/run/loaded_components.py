@@ -129,11 +129,11 @@ def _free(components: Mapping[str, Component]) -> None:
 
 def _protocol_parameters(table: ComponentTable, component: Component, where: str) -> dict[str, float | str]:
     """What the table says about late events, as parameters of an FMU; a block was made with them."""
-    given: dict[str, float | str] = {
+    stated: dict[str, float | str] = {
         name: getattr(table, name) for name in sorted(table.model_fields_set & LATE_PARAMETERS)
     }
-    for name in given:
+    for name in stated:
         if name not in component.variables:
             why = "what it does with late events is its own choice" if component.events else "it receives no events"
             raise ScenarioError(f"{where}: this {component.kind} has no parameter {name}; {why}.")
-    return given if component.kind == "FMU" else {}
+    return stated if component.kind == "FMU" else {}

@@ -137,6 +137,6 @@ def _switching_signals(table: ScenarioTable, recorded: Iterable[str]) -> list[in
     expectations look at.
     """
     spec = report_spec(table)
-    judged = {spec.true_fault, *(f"{observer}.{spec.detection}" for observer in spec.observers)}
-    judged |= {getattr(item, "signal", None) for item in table.expect}
-    return [place for place, name in enumerate(recorded) if name in judged]
+    evaluated = {spec.true_fault, *(f"{observer}.{spec.detection}" for observer in spec.observers)}
+    evaluated |= {getattr(item, "signal", None) for item in table.expect}
+    return [place for place, name in enumerate(recorded) if name in evaluated]

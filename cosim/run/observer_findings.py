@@ -12,7 +12,7 @@ from math import inf, isfinite
 from typing import Any, NamedTuple
 
 from cosim.errors import CertificateError
-from cosim.run.component_models import given_parameters, make_system, values_in_use
+from cosim.run.component_models import make_system, stated_parameters, values_in_use
 from cosim.run.expected_gaps import ExpectedGap
 from cosim.scenario.scenario_tables import ComponentTable
 from fmu_observer.certificates.finding import Finding
@@ -111,7 +111,7 @@ def evaluated(name: str, table: ComponentTable, system: Any, gap: ExpectedGap | 
     """
     if not hasattr(system, "findings"):
         return None, []
-    asked = name, system, table.preset, given_parameters(table, system), None if gap is None else astuple(gap)
+    asked = name, system, table.preset, stated_parameters(table, system), None if gap is None else astuple(gap)
     key = identity(asked, code=("fmu_observer", "cosim/run/observer_findings.py"))
 
     def evaluate() -> tuple[dict[str, Any] | None, list[str]]:
@@ -123,7 +123,7 @@ def evaluated(name: str, table: ComponentTable, system: Any, gap: ExpectedGap | 
 
 
 def _evaluated(name: str, table: ComponentTable, system: Any, gap: ExpectedGap | None) -> Evaluation:
-    in_use = given_parameters(table, system), table.preset
+    in_use = stated_parameters(table, system), table.preset
     if not hasattr(system, "sampled_events"):
         return None, _of_condition(system, *in_use)
     if gap is None:
@@ -179,7 +179,7 @@ def _of_unknown_gap(name: str, found: Finding, gap: ExpectedGap) -> Evaluation:
 
 def _entry(found: Finding, table: ComponentTable, system: Any) -> dict[str, Any]:
     """The entry of a results folder: infinite limits as None; numbers at a gap only where one was asked for."""
-    constant, in_use = found.condition(CONSTANT_GAP), (given_parameters(table, system), table.preset)
+    constant, in_use = found.condition(CONSTANT_GAP), (stated_parameters(table, system), table.preset)
     ends = [part.value for part in (found, constant) if part.limit == inf]
     numbers = {
         "max_gap": found.demand,

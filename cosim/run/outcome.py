@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.errors import UnmetError
 from cosim.evaluation.spec import ReportSpec
-from cosim.expectations.judged import Judged, judged_table
+from cosim.expectations.evaluated import Evaluated, evaluated_table
 from cosim.results.result import Result
 from cosim.results.results_folder import remove_report, write_results
 from cosim.run.made_from import renewed
@@ -53,18 +53,18 @@ class Outcome:
         return list(self.result.summary.get("warnings", []))
 
     @property
-    def expectations(self) -> list[Judged]:
+    def expectations(self) -> list[Evaluated]:
         """What became of the expectations of the scenario, in order."""
-        return [Judged.from_data(data) for data in self.result.summary.get("expectations", [])]
+        return [Evaluated.from_data(data) for data in self.result.summary.get("expectations", [])]
 
     @property
-    def unmet(self) -> list[Judged]:
+    def unmet(self) -> list[Evaluated]:
         """Expectations that are not met."""
-        return [judged for judged in self.expectations if not judged.passed]
+        return [evaluated for evaluated in self.expectations if not evaluated.passed]
 
     def expectations_text(self) -> str:
         """A list of all expectations for people, what is not met first; empty where the scenario has none."""
-        return judged_table(self.expectations).text()
+        return evaluated_table(self.expectations).text()
 
     def check(self) -> Self:
         """The outcome itself, where the run reached its end and all its expectations are met: the last line of a test.

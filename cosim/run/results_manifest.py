@@ -59,15 +59,15 @@ class Manifest:
             lines += [_difference(made / p["copy"], p["sha256"]) for p in foreign["parts"] if p["copy"] is not None]
         return [line for line in lines if line]
 
-    def missing(self, given: Collection[str] = ()) -> list[str]:
+    def missing(self, stated: Collection[str] = ()) -> list[str]:
         """Files that were not kept and are not where they were, or are others by now, one line each.
 
         Args:
-            given: keys of files that are given anew and not looked for, ``components.train.fmu``.
+            stated: keys of files that are given anew and not looked for, ``components.train.fmu``.
         """
         lines = []
         for foreign in self.data["files"]:
-            lost = [p for p in foreign["parts"] if p["copy"] is None] if foreign["key"] not in given else []
+            lost = [p for p in foreign["parts"] if p["copy"] is None] if foreign["key"] not in stated else []
             for part in lost:
                 what = _difference(Path(part["path"]), part["sha256"])
                 if what:
@@ -162,8 +162,8 @@ def _difference(path: Path, digest: str | None) -> str:
     try:
         if not path.is_file():
             return f"{path} is missing (SHA-256 {str(digest)[:12]}...)."
-        same = digest is None or sha256(path) == digest
-        return "" if same else f"{path} was changed since: its SHA-256 is not {str(digest)[:12]}..."
+        equal = digest is None or sha256(path) == digest
+        return "" if equal else f"{path} was changed since: its SHA-256 is not {str(digest)[:12]}..."
     except OSError as error:
         return f"{path} cannot be read: {error.strerror or error}."
 

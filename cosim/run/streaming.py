@@ -30,12 +30,12 @@ def _streaming_to(directory: str | Path, origin: Origin) -> Streaming:
 
 
 def where_to(
-    stream: str | Path | None, spare: str | Path | None, origin: Origin
+    stream: str | Path | None, fallback: str | Path | None, origin: Origin
 ) -> tuple[Path | None, Streaming | None]:
     """The results folder that a run streams to, and what it needs to stream to that or to the spare one.
 
     Args:
-        stream: results folder; None for none. spare: folder for rows in case the process dies; None for none.
+        stream: results folder; None for none. fallback: folder for rows in case the process dies; None for none.
         origin: of the run.
 
     Raises:
@@ -44,7 +44,7 @@ def where_to(
     if stream is not None:
         folder = Path(stream).absolute()  # an FMU may change the working directory
         return folder, _streaming_to(folder, origin)
-    return None, None if spare is None else (Path(spare).absolute(), lambda: None)
+    return None, None if fallback is None else (Path(fallback).absolute(), lambda: None)
 
 
 def ending(

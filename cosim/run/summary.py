@@ -107,7 +107,7 @@ def _shown(value: StartValue) -> Any:
     return value.hex() if isinstance(value, bytes) else value
 
 
-def judged_summary(result: Result, spec: ReportSpec) -> dict[str, Any]:
+def evaluated_summary(result: Result, spec: ReportSpec) -> dict[str, Any]:
     """What the report is given, and what it evaluates: faults, position errors at balises, consistency of filters.
 
     Args:

@@ -42,7 +42,7 @@ def serve(handle: int, page: str, script: dict[str, str]) -> None:
         except (EOFError, ConnectionResetError):
             return
         try:
-            pipe.send_bytes(_answer(data))
+            pipe.send_bytes(_response(data))
         except (BrokenPipeError, ConnectionResetError):
             return
 
@@ -71,7 +71,7 @@ def _opened(handle: int) -> Any:
     return connection.Connection(handle)
 
 
-def _answer(data: bytes) -> bytes:
+def _response(data: bytes) -> bytes:
     try:
         job = pickle.loads(data)
     except Exception as error:  # a class that is not found here, whatever its module raises

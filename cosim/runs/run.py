@@ -98,11 +98,11 @@ class Run(Job):
             named = foreign_files(self._table, self.scenario.folder)
         except CosimError:  # the run says why it cannot be
             return ()
-        return [file for file in named if file.owner not in self._given]
+        return [file for file in named if file.owner not in self._stated]
 
     def code(self) -> Sequence[Callable[..., Any]]:
         """`take`, and the classes that a script put into the scenario."""
-        given = self._given.values()
+        given = self._stated.values()
         return [self.take, *(model if isinstance(model, type) else type(model) for model in given)]
 
     def moved(self, places: Mapping[str, str]) -> Run:
@@ -129,7 +129,7 @@ class Run(Job):
         return self._resolved().table()
 
     @property
-    def _given(self) -> dict[str, Any]:
+    def _stated(self) -> dict[str, Any]:
         """Classes and instances that a script put into the scenario, by component: they travel as they are."""
         models = {name: table.model or table.observer for name, table in self._table.components.items()}
         return {name: model.given for name, model in models.items() if model is not None and model.given is not None}

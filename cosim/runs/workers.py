@@ -77,7 +77,7 @@ class Team:
             occupy()
             while busy and not stopped():
                 for worker in _ready(busy):
-                    job, ended = worker.job, worker.answer()
+                    job, ended = worker.job, worker.response()
                     busy.remove(worker)
                     if worker.dead:
                         worker.stop()
@@ -115,12 +115,12 @@ class Team:
 def _ready(busy: Sequence[_Worker]) -> list[_Worker]:
     """Those of the workers whose answers can be read, after a while at most; a call that takes too long is ended."""
     begin = monotonic()
-    answers = wait([worker.pipe for worker in busy], _POLL)
+    responses = wait([worker.pipe for worker in busy], _POLL)
     elapsed = min(monotonic() - begin, 2.0 * _POLL)  # this program may have been stopped meanwhile
     for worker in busy:
-        if worker.pipe not in answers:
+        if worker.pipe not in responses:
             worker.check_duration(elapsed)
-    return [worker for worker in busy if worker.pipe in answers]
+    return [worker for worker in busy if worker.pipe in responses]
 
 
 class _Worker:
@@ -151,7 +151,7 @@ class _Worker:
         with suppress(BrokenPipeError, ConnectionResetError):
             self.pipe.send_bytes(data)
 
-    def answer(self) -> Ended:
+    def response(self) -> Ended:
         """What the job left."""
         try:
             ended: Ended = pickle.loads(self.pipe.recv_bytes())

@@ -130,11 +130,11 @@ def _read(path: Path, chain: Sequence[Path]) -> dict[str, Any]:
         raise ScenarioError(f"{path}: not readable as TOML: {error}{by}") from error
 
 
-def _listed(given: Any, path: Path) -> list[str]:
-    names = [given] if isinstance(given, str) else given
+def _listed(stated: Any, path: Path) -> list[str]:
+    names = [stated] if isinstance(stated, str) else stated
     if not isinstance(names, list) or not all(isinstance(name, str) and name for name in names):
         raise ScenarioError(
-            f"{path}: include: expected a list of files and names of shipped scenarios (got {given!r})."
+            f"{path}: include: expected a list of files and names of shipped scenarios (got {stated!r})."
         )
     return names
 

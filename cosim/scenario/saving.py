@@ -68,10 +68,10 @@ def _with_files(table: ScenarioTable, folder: Path, path: Path, unpacked: Path |
         return table
     beside = path.parent.resolve() / f"{path.stem}_files"
 
-    def keep(given: str) -> str:
-        place = (folder / given).resolve()
+    def keep(stated: str) -> str:
+        place = (folder / stated).resolve()
         if not place.is_relative_to(unpacked.resolve()):
-            return given
+            return stated
         copy = beside / "_".join(place.relative_to(unpacked.resolve()).parts)
         beside.mkdir(exist_ok=True)
         return str(shutil.copyfile(place, copy))

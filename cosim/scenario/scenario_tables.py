@@ -51,10 +51,10 @@ def _option(value: Any) -> Any:
     )
 
 
-def _is_row(given: Any) -> bool:
-    return isinstance(given, list | tuple) and all(
+def _is_row(stated: Any) -> bool:
+    return isinstance(stated, list | tuple) and all(
         entry is None or (isinstance(entry, int | float) and not isinstance(entry, bool) and math.isfinite(entry))
-        for entry in given
+        for entry in stated
     )
 
 
@@ -75,10 +75,10 @@ Tolerance = Annotated[float | Literal["none"], PlainValidator(_tolerance)]
 Backend = Literal["fmu3", "fmu2", "block3", "block2"]
 
 
-def _starts(given: Any) -> Any:
+def _starts(stated: Any) -> Any:
     """Start values, of which a seed that is no number says that it is one."""
-    seed = given.get("seed") if isinstance(given, dict) else None
-    return {**given, "seed": _Seed(seed)} if isinstance(seed, float) and not math.isfinite(seed) else given
+    seed = stated.get("seed") if isinstance(stated, dict) else None
+    return {**stated, "seed": _Seed(seed)} if isinstance(seed, float) and not math.isfinite(seed) else stated
 
 
 class ComponentTable(TomlTable):
@@ -107,21 +107,21 @@ class ComponentTable(TomlTable):
 
     @model_validator(mode="after")
     def _one_origin(self) -> ComponentTable:
-        given = [k for k in ("fmu", "model", "observer", "recording") if getattr(self, k) is not None]
-        if len(given) != 1:
+        stated = [k for k in ("fmu", "model", "observer", "recording") if getattr(self, k) is not None]
+        if len(stated) != 1:
             raise ValueError(
                 "give exactly one of 'fmu' (a path), 'model' (a plant), 'observer' (an observer; both by name or "
                 "file.py:Class) or 'recording' (a results folder or a table)"
             )
-        if given == ["fmu"] and (self.preset or self.options or self.backend):
+        if stated == ["fmu"] and (self.preset or self.options or self.backend):
             raise ValueError("'preset', 'options' and 'as' belong to shipped models; an FMU takes 'parameters' only")
-        if given != ["fmu"] and self.filter is not None:
+        if stated != ["fmu"] and self.filter is not None:
             raise ValueError("'filter' belongs to an 'fmu', which it takes as its model")
-        if given != ["fmu"] and self.tolerance is not None:
+        if stated != ["fmu"] and self.tolerance is not None:
             raise ValueError("'tolerance' belongs to an FMU; shipped models have the parameter 'internal_step' instead")
-        if given != ["recording"] and {"component", "interpolation"} & self.model_fields_set:
+        if stated != ["recording"] and {"component", "interpolation"} & self.model_fields_set:
             raise ValueError("'component' and 'interpolation' belong to a recording")
-        if given == ["recording"] and (self.preset or self.options or self.backend or self.parameters):
+        if stated == ["recording"] and (self.preset or self.options or self.backend or self.parameters):
             raise ValueError(
                 "a recording takes 'component' and 'interpolation', no 'parameters', 'preset', 'options' or 'as'"
             )
@@ -248,7 +248,7 @@ LINE, TABLE = "connection line", "connection table"
 """Tags of the two forms of a connection; left out of messages."""
 ConnectionItem = Annotated[
     Annotated[str, Tag(LINE)] | Annotated[ConnectionTable, Tag(TABLE)],
-    Discriminator(lambda given: TABLE if isinstance(given, dict | ConnectionTable) else LINE),
+    Discriminator(lambda stated: TABLE if isinstance(stated, dict | ConnectionTable) else LINE),
 ]
 
 
@@ -276,7 +276,7 @@ class MeasureTable(TomlTable):
 
 
 _MeasureItem = Annotated[
-    MeasureTable, BeforeValidator(lambda given: {"measure": given} if isinstance(given, str) else given)
+    MeasureTable, BeforeValidator(lambda stated: {"measure": stated} if isinstance(stated, str) else stated)
 ]
 
 

@@ -36,16 +36,16 @@ from fmus.fmi.standard import TIME_TOLERANCE
 from plant_models.hybrid.noise import RUN_SEED
 
 
-def _expectation(given: Any) -> Expectation:
+def _expectation(stated: Any) -> Expectation:
     """An expectation by its ``check``, of those that are registered when the scenario is read."""
-    if isinstance(given, Expectation):
-        return given
-    check = given.get("check") if isinstance(given, dict) else None
+    if isinstance(stated, Expectation):
+        return stated
+    check = stated.get("check") if isinstance(stated, dict) else None
     if not isinstance(check, str):
         raise ValueError(f"expected a table with the key 'check', which is one of: {', '.join(EXPECTATIONS)}")
     if check not in EXPECTATIONS:
         raise ValueError(f"unknown check {check!r}; {nearest(check, EXPECTATIONS)}")
-    return _adapter(EXPECTATIONS[check]).validate_python({check: given})[check]
+    return _adapter(EXPECTATIONS[check]).validate_python({check: stated})[check]
 
 
 @cache
@@ -207,15 +207,15 @@ def _explain(item: dict[str, Any]) -> str:
         return f"{place}: unknown key; {_hint(item)}"
     if item["type"] == "missing":
         return f"{place}: is missing"
-    given = item.get("input")
-    if item["type"] == "value_error" or isinstance(given, dict):
+    stated = item.get("input")
+    if item["type"] == "value_error" or isinstance(stated, dict):
         return f"{place}: {str(item['msg']).removeprefix('Value error, ')}"
     message = wrong_value(item)
     if item["loc"][-1:] == ("float",):
         message = "expected a number, or a list of numbers for a vector"
     key = str(item["loc"][2]) if item["loc"][:1] == ("components",) and len(item["loc"]) > 2 else ""
     message = EXPECTED.get(key, message)
-    return f"{place}: {message} (got {json.dumps(given, default=str)})"
+    return f"{place}: {message} (got {json.dumps(stated, default=str)})"
 
 
 def _hint(item: dict[str, Any]) -> str:

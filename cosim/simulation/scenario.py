@@ -341,7 +341,7 @@ class Scenario:
         building: Callable[[str], None] | None = None,
         stream: str | Path | None = None,
         finished: Callable[[Outcome], None] | None = None,
-        spare: str | Path | None = None,
+        fallback: str | Path | None = None,
     ) -> Outcome:
         """Run it.
 
@@ -358,8 +358,8 @@ class Scenario:
                 ``table.npy``; `Outcome.write` adds formats that the scenario asks for.
             finished: called with the outcome before the components are closed, which is what is returned as well: what
                 it writes is not lost where an FMU crashes while it is freed.
-            spare: a folder to which rows are written as for `stream`, only in case the process dies: whoever gives it
-                removes it.
+            fallback: a folder to which rows are written as for `stream`, only in case the process dies: whoever gives
+                it removes it.
 
         Returns:
             The outcome: result, report roles, warnings; also for a run that failed on the way (see `Outcome.failure`).
@@ -379,7 +379,7 @@ class Scenario:
         with self._places_named():
             task = RunTask(table, scenario.name, self.folder, self.where)
             origin = Origin.of(table, task.name, task.folder, task.where, self._files)
-            folder, streaming = where_to(stream, spare, origin)
+            folder, streaming = where_to(stream, fallback, origin)
             finish = ending(origin, folder, warn or LOG.warning, finished)
             return run_scenario(task, progress, warn, log, building, streaming, self._warnings, finish)
 

@@ -135,7 +135,7 @@ class UnitTable:
         definition.
         """
         usual, defined = _usual(name), self._units[name]
-        if usual is not None and not _same(usual, defined):
+        if usual is not None and not _equal(usual, defined):
             meant = f"unit {name!r} is defined as {_formula(defined)}, usually it is {_formula(usual)}"
             self._lapses.note(node, f"{meant}; values are converted by the definition of the package.")
 
@@ -192,7 +192,7 @@ def _usual(name: str) -> Unit | None:
         return None
 
 
-def _same(one: Unit, other: Unit) -> bool:
+def _equal(one: Unit, other: Unit) -> bool:
     close = [
         math.isclose(a, b, rel_tol=1e-6, abs_tol=1e-12)
         for a, b in ((one.factor, other.factor), (one.offset, other.offset))

@@ -231,13 +231,13 @@ class _Exporter:
     def parameter_file(self, name: str, part: _ExportedPart) -> bytes | None:
         """The parameter set of a component, or None where it has none."""
         late = {k: getattr(part.table, k) for k in sorted(part.table.model_fields_set & LATE_PARAMETERS)}
-        given = {k: v for k, v in late.items() if k in part.interface.variables} | part.table.parameters
-        given |= self.seeds[name]
-        if not given:
+        stated = {k: v for k, v in late.items() if k in part.interface.variables} | part.table.parameters
+        stated |= self.seeds[name]
+        if not stated:
             return None
         root = root_of("ssv", "ParameterSet", self.version, name=name, generationTool=TOOL)
         parameters = child(root, "ssv", "Parameters")
-        for key, value in given.items():
+        for key, value in stated.items():
             for variable, values, shape in self.assignments(name, part.interface, key, value):
                 self.add_parameter(parameters, part.interface, variable, values, shape)
         return text_of(root)
@@ -292,12 +292,12 @@ class _Exporter:
         """The connections of the root system, as a scenario writes them."""
         links = parse_connections(written, self.where)
         holder = child(system, "ssd", "Connections") if links else None
-        for source, target, *given in links:
+        for source, target, *stated in links:
             ends = [self.end(name, causality) for name, causality in ((source, "output"), (target, "input"))]
             attributes = {
                 f"{side}{key}": text for side, end in zip(("start", "end"), ends, strict=True) for key, text in end
             }
-            transformation = given[0] if given else None
+            transformation = stated[0] if stated else None
             if transformation is not None and not transformation.convert_units:
                 attributes["suppressUnitConversion"] = "true"
             node = child(holder, "ssd", "Connection", **attributes)
@@ -325,23 +325,23 @@ class _Exporter:
             )
         return [("Element", component), ("Connector", found[1]), ("Indices", found[2].replace(",", " "))]
 
-    def add_transformation(self, node: Node, source: str, target: str, given: Any) -> None:
+    def add_transformation(self, node: Node, source: str, target: str, stated: Any) -> None:
         """What a connection does to its values: linear on real numbers, tables on the others."""
         component, _, signal = target.partition(".")
         interface = self.parts[component].interface
         name = signal if signal in interface.variables else signal.rpartition("[")[0]
-        family, values = FAMILIES[interface.variables[name].type], dict(given.table)
+        family, values = FAMILIES[interface.variables[name].type], dict(stated.table)
         if family == REAL:
-            if (given.factor, given.offset) != (1.0, 0.0):
-                child(node, "ssc", "LinearTransformation", factor=repr(given.factor), offset=repr(given.offset))
+            if (stated.factor, stated.offset) != (1.0, 0.0):
+                child(node, "ssc", "LinearTransformation", factor=repr(stated.factor), offset=repr(stated.offset))
             return
-        if (given.factor, given.offset) != (1.0, 0.0):
+        if (stated.factor, stated.offset) != (1.0, 0.0):
             domain = {"Boolean": [0.0, 1.0], "Enumeration": self.item_numbers(source)}.get(family)
             if domain is None:
                 raise ScenarioError(
                     f"{self.where}: connection to {target}: SSP knows no factor for type {family}; use 'values'."
                 )
-            values = {value: given.factor * value + given.offset for value in domain}
+            values = {value: stated.factor * value + stated.offset for value in domain}
         if values:
             kind = "Boolean" if family == "Boolean" else INTEGER
             holder = child(node, "ssc", f"{kind}MappingTransformation")

@@ -257,7 +257,7 @@ class _Reader:
     def _referenced(self, node: Node, kind: str, source: str) -> SystemElement:
         path, fragment = split_variant(source)
         if not path:
-            return self._same_document(node, fragment)
+            return self._equal_document(node, fragment)
         member = self.package.member(node, path, self.member)
         package = self.package
         if kind == _PACKAGE:
@@ -272,7 +272,7 @@ class _Reader:
             fail(node, f"component {node.get('name')!r} nests {source!r} within itself.")
         return read_structure(package, member, self.outer).system
 
-    def _same_document(self, node: Node, identity: str) -> SystemElement:
+    def _equal_document(self, node: Node, identity: str) -> SystemElement:
         """A system of this file used once more."""
         key = f"{self.package.path}#{self.member}#{identity}"
         systems = [s for s in self.root.iter(f"{{{node.nsmap[node.prefix]}}}System") if s.get("id") == identity]

@@ -171,7 +171,7 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
         )
     else:
         kind, values = "alone", alone(inspected)
-    known = {"look": inspected, "fmu": place, "target": target.name, "about": _about(inspected), "listed": LISTED}
+    known = {"inspected": inspected, "fmu": place, "target": target.name, "about": _about(inspected), "listed": LISTED}
     text = _render(kind, guesses=kind != "alone", **known, **values)
     return Starter(text, kind, list(_remarks(inspected, kind, roles, observer)))
 

@@ -11,7 +11,7 @@ import numpy as np
 from cosim.evaluation.balise_gaps import PLAIN_ODOMETER, gap_errors, largest
 from cosim.evaluation.consistency import filter_consistency
 from cosim.evaluation.fault_detection import fault_detection
-from cosim.evaluation.metrics import judged_size, within
+from cosim.evaluation.metrics import evaluated_size, within
 from cosim.evaluation.roles import Quantity, estimation_error
 from cosim.evaluation.spec import Phase
 from cosim.run.outcome import Outcome
@@ -22,7 +22,7 @@ SHARES: Mapping[str, tuple[str, str]] = {
     "false_share": ("false_alarms", "detections"),
 }
 """Measures that are shares of counted things: name to those of the count and of the number in all."""
-RATES: Mapping[str, tuple[str, str]] = {"false_alarms_per_hour": ("false_alarms", "judged_time")}
+RATES: Mapping[str, tuple[str, str]] = {"false_alarms_per_hour": ("false_alarms", "evaluated_time")}
 """Measures that are counts in an hour: name to those of the count and of the time [s]."""
 _ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
 _GAP_UNITS = {"gap_error_max": "m", "gap_error_time_max": "s"}
@@ -32,7 +32,7 @@ _DETECTION_UNITS = {
     "missed_faults": "1",
     "detections": "1",
     "false_alarms": "1",
-    "judged_time": "s",
+    "evaluated_time": "s",
     "detection_delay": "s",
     "recovery_delay": "s",
     "false_alarm_time": "s",
@@ -69,7 +69,7 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
             error = estimation_error(result, spec, observer, quantity)
             if error is None:
                 continue
-            size = judged_size(result.time[rows], error[rows])
+            size = evaluated_size(result.time[rows], error[rows])
             failed = outcome.failure is not None
             measures[f"{observer}.{quantity}_error_max"] = nan if failed else size.max_abs
             measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms
@@ -102,7 +102,7 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
 
     Returns:
         ``observer.faults``, ``observer.missed_faults``, ``observer.detections`` and ``observer.false_alarms`` as
-        counts, ``observer.judged_time`` [s], the means ``observer.detection_delay`` and ``observer.recovery_delay``
+        counts, ``observer.evaluated_time`` [s], the means ``observer.detection_delay`` and ``observer.recovery_delay``
         [s], ``observer.false_alarm_time`` [s], ``observer.missed_share`` of the faults, ``observer.false_share`` of the
         detections, ``observer.false_alarms_per_hour`` [1/h], the mean ``observer.balise_error`` [m] and the largest
         ``observer.balise_error_max`` [m] of the position before each balise; NaN where there is none, and for a run
@@ -116,7 +116,7 @@ def detection_measures(outcome: Outcome) -> dict[str, float]:
             "missed_faults": found.missed,
             "detections": found.detections,
             "false_alarms": found.false,
-            "judged_time": found.duration,
+            "evaluated_time": found.duration,
             "detection_delay": _mean(found.start_delays),
             "recovery_delay": _mean(found.end_delays),
             "false_alarm_time": found.time_outside,

@@ -57,7 +57,7 @@ class Replay:
         table = _table(outcome, observer)
         self._component = table.components[observer]
         self.system = _system(self._component, observer)
-        self._given = self._component.parameters | self._seed(table.seed)
+        self._stated = self._component.parameters | self._seed(table.seed)
         self.instants = _instants(outcome, table)
         self._first, self._inputs = _inputs(outcome, table, observer, self.system)
         self._batches: dict[int, Batch] = {}
@@ -91,10 +91,10 @@ class Replay:
             BatchError: a name is unknown or a shape does not fit.
             ReplayError: an input that is to be late is not connected.
         """
-        given = {name: np.asarray(values, dtype=float) for name, values in (parameters or {}).items()}
-        count = members if members is not None else self._members(given)
+        stated = {name: np.asarray(values, dtype=float) for name, values in (parameters or {}).items()}
+        count = members if members is not None else self._members(stated)
         batch = self._batch(count)
-        for name, values in given.items():
+        for name, values in stated.items():
             batch.set(name, values)
         for name, value in self._first.items():
             batch.set(name, value)
@@ -119,10 +119,10 @@ class Replay:
         signals, known = self.system.parameter_signals, scalar_names(self.system.parameter_signals)
         values = dict(zip(known, map(float, self.system.start_parameters(self._component.preset)), strict=True))
         elements = {signal.name: signal.scalar_names for signal in signals} | {name: [name] for name in known}
-        for name, given in self._given.items():
+        for name, stated in self._stated.items():
             if name in elements:
                 values |= zip(
-                    elements[name], np.broadcast_to(np.asarray(given, float), len(elements[name])), strict=True
+                    elements[name], np.broadcast_to(np.asarray(stated, float), len(elements[name])), strict=True
                 )
         return values
 
@@ -141,10 +141,10 @@ class Replay:
         moved = {name: np.clip(places - points, 0, len(places) - 1) for name, points in late.items()}
         return {name: values[moved[name]] if name in moved else values for name, values in self._inputs.items()}
 
-    def _members(self, given: Mapping[str, np.ndarray]) -> int:
+    def _members(self, stated: Mapping[str, np.ndarray]) -> int:
         """How many members the parameters are given for; 1 where each has one value for all."""
         vectors = {s.name for s in (*self.system.parameter_signals, *self.system.states) if s.size is not None}
-        return max((len(v) for name, v in given.items() if v.ndim > (1 if name in vectors else 0)), default=1)
+        return max((len(v) for name, v in stated.items() if v.ndim > (1 if name in vectors else 0)), default=1)
 
     def _batch(self, members: int) -> Batch:
         """So many members with the parameters of the run, before time begins; the last few are kept for the next
@@ -155,7 +155,7 @@ class Replay:
             self._batches = dict(kept) | {members: Batch(self.system, members, self._component.preset)}
         batch = self._batches[members]
         batch.reset()
-        for name, value in self._given.items():
+        for name, value in self._stated.items():
             batch.set(name, np.asarray(value, dtype=float))
         return batch
 
@@ -249,12 +249,12 @@ def _units(system: HybridSystem) -> list[str]:
     return [signal.unit for signal in system.inputs for _ in signal.scalar_names]
 
 
-def _transformed(values: np.ndarray, given: Transformation, source: str | None, target: str) -> np.ndarray:
+def _transformed(values: np.ndarray, stated: Transformation, source: str | None, target: str) -> np.ndarray:
     """What a connection makes of the recorded values, as the master computes it."""
-    if given.table:
+    if stated.table:
         raise ReplayError("A connection with a table of values is not replayed.")
     factor, offset = 1.0, 0.0
-    if given.convert_units and source is not None:
+    if stated.convert_units and source is not None:
         factor, offset = conversion(parse_unit(source), parse_unit(target))
-    factor, offset = given.after(factor, offset)
+    factor, offset = stated.after(factor, offset)
     return values if (factor, offset) == (1.0, 0.0) else factor * values + offset

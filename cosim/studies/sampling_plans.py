@@ -89,10 +89,12 @@ def variations(
     if not values:
         raise ScenarioError("vary: nothing is varied; expected for instance {'plant.mass': [70e3, 80e3]}.")
     if mode in ("latin", "random"):
-        return _sampled({name: _choices(name, given, ranges=True) for name, given in values.items()}, mode, count, seed)
+        return _sampled(
+            {name: _choices(name, stated, ranges=True) for name, stated in values.items()}, mode, count, seed
+        )
     if count is not None:
         raise ScenarioError(f"vary: 'count' belongs to mode 'latin' or 'random', not to {mode!r}.")
-    lists = {name: _choices(name, given, ranges=False) for name, given in values.items()}
+    lists = {name: _choices(name, stated, ranges=False) for name, stated in values.items()}
     if mode == "zip" and len({len(entries) for entries in lists.values()}) > 1:
         lengths = ", ".join(f"{name} {len(entries)}" for name, entries in lists.items())
         raise ScenarioError(f"vary: mode 'zip' needs lists of one length (got {lengths}).")
@@ -119,19 +121,19 @@ def _listed(values: Any) -> list[Variation]:
     return [plain(row) for row in rows]
 
 
-def _choices(name: str, given: Any, ranges: bool) -> Any:
+def _choices(name: str, stated: Any, ranges: bool) -> Any:
     """The values of one name as a list; a range as it is, where it may be one."""
-    if isinstance(given, Range):
+    if isinstance(stated, Range):
         if not ranges:
             raise ScenarioError(
                 f"vary: {name}: a range is sampled; use mode='latin' or 'random' with count=..., or give a list."
             )
-        return given
-    if isinstance(given, str | bytes | Mapping) or not isinstance(given, Iterable):
-        raise ScenarioError(f"vary: {name}: expected a list of values (got {given!r}).")
+        return stated
+    if isinstance(stated, str | bytes | Mapping) or not isinstance(stated, Iterable):
+        raise ScenarioError(f"vary: {name}: expected a list of values (got {stated!r}).")
     # an endless or huge iterable is not listed to its end
-    entries = [plain(entry) for entry in islice(given, MOST + 1)]
-    _check_count(len(given) if isinstance(given, Sized) else len(entries))
+    entries = [plain(entry) for entry in islice(stated, MOST + 1)]
+    _check_count(len(stated) if isinstance(stated, Sized) else len(entries))
     if not entries:
         raise ScenarioError(f"vary: {name}: the list of values is empty.")
     return entries
@@ -147,9 +149,10 @@ def _sampled(choices: Mapping[str, Any], mode: Mode, count: int | None, seed: in
     else:
         points = np.random.default_rng(seed).random((count, len(choices)))
     return [
-        {name: _pick(given, float(u)) for (name, given), u in zip(choices.items(), row, strict=True)} for row in points
+        {name: _pick(stated, float(u)) for (name, stated), u in zip(choices.items(), row, strict=True)}
+        for row in points
     ]
 
 
-def _pick(given: Any, share: float) -> Any:
-    return given.at(share) if isinstance(given, Range) else given[int(share * len(given))]
+def _pick(stated: Any, share: float) -> Any:
+    return stated.at(share) if isinstance(stated, Range) else stated[int(share * len(stated))]

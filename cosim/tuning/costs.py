@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.errors import ScenarioError, nearest
 from cosim.evaluation.consistency import measurement_count
-from cosim.evaluation.metrics import judged_size
+from cosim.evaluation.metrics import evaluated_size
 from cosim.evaluation.roles import estimation_error
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome
@@ -96,7 +96,7 @@ class StateCost(Cost):
             )
         rows = _evaluated(outcome)
         time = np.ascontiguousarray(result.time[rows])
-        return sum(judged_size(time, error[rows]).rms ** 2 for error in errors)
+        return sum(evaluated_size(time, error[rows]).rms ** 2 for error in errors)
 
 
 @dataclass(frozen=True)
@@ -208,10 +208,10 @@ class ExpectationCost(Cost):
 
     def of(self, outcome: Outcome) -> float:
         """The cost, see `Cost.of`."""
-        judged = outcome.expectations
-        found = [j for j in judged if self.which == str(j.number) or self.which in j.name]
+        evaluated = outcome.expectations
+        found = [j for j in evaluated if self.which == str(j.number) or self.which in j.name]
         if not found:
-            known = [f"{j.number} ({j.name})" for j in judged]
+            known = [f"{j.number} ({j.name})" for j in evaluated]
             raise ScenarioError(f"The scenario has no expectation {self.which!r}; known: {', '.join(known) or 'none'}.")
         return max(self.sign * j.measured for j in found)
 
@@ -242,12 +242,12 @@ class OwnCost(Cost):
 
 
 def make_cost(
-    given: str | Cost | Callable[[Outcome], float], observer: str | None, outputs: Sequence[str] = ()
+    stated: str | Cost | Callable[[Outcome], float], observer: str | None, outputs: Sequence[str] = ()
 ) -> Cost:
     """The cost that is meant.
 
     Args:
-        given: ``state``, ``state:observer.a=plant.b,observer.c=plant.d``, ``likelihood``, ``nis``,
+        stated: ``state``, ``state:observer.a=plant.b,observer.c=plant.d``, ``likelihood``, ``nis``,
             ``expectation:NUMBER or part of its text``, the name of a measure (``speed_error_rms``,
             ``observer.gap_error_max``), with ``-`` in front where the largest is wanted; or a function of the outcome.
         observer: the component that is tuned; None where there is none.
@@ -256,11 +256,11 @@ def make_cost(
     Raises:
         ScenarioError: it needs an observer and none is named, or it cannot be read.
     """
-    if isinstance(given, Cost):
-        return given
-    if not isinstance(given, str):
-        return OwnCost(given)
-    sign, text = (-1.0, given[1:]) if given.startswith("-") else (1.0, given)
+    if isinstance(stated, Cost):
+        return stated
+    if not isinstance(stated, str):
+        return OwnCost(stated)
+    sign, text = (-1.0, stated[1:]) if stated.startswith("-") else (1.0, stated)
     kind, colon, rest = text.partition(":")
     if kind == "expectation":
         if not rest:
@@ -274,7 +274,7 @@ def make_cost(
         measurements = None if "nis_degrees" in outputs else measurement_count(outputs)
         return LikelihoodCost(observer) if kind == "likelihood" else NisCost(observer, measurements)
     if colon:
-        raise ScenarioError(f"cost {given!r}: {nearest(kind, KINDS)}")
+        raise ScenarioError(f"cost {stated!r}: {nearest(kind, KINDS)}")
     return MeasureCost(text if "." in text or observer is None else f"{observer}.{text}", sign)
 
 

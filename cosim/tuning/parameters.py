@@ -52,7 +52,7 @@ class Tunable:
         Args:
             values: of the parameters, by name.
         """
-        vectors = {name: list(given) for name, given in self.vectors.items()}
+        vectors = {name: list(stated) for name, stated in self.vectors.items()}
         settings: dict[str, Any] = {}
         for name, value in values.items():
             if name in self.entries:
@@ -77,19 +77,19 @@ def tunable(scenario: Scenario, component: str | None, bounds: Mapping[str, Boun
     if not bounds:
         raise ScenarioError("Nothing is tuned: give parameters with bounds, such as {'observer.gain': (0.1, 10.0)}.")
     parameters, start, vectors, entries, diagonals = [], {}, {}, {}, []
-    for given, limits in bounds.items():
-        name = given if component is None or _head(given) in _scenario_names(scenario) else f"{component}.{given}"
+    for stated, limits in bounds.items():
+        name = stated if component is None or _head(stated) in _scenario_names(scenario) else f"{component}.{stated}"
         parameters.append(_bounded(name, limits))
         match = ENTRY.fullmatch(name)
-        found = _present(scenario, match[1] if match else name, given)
+        found = _present(scenario, match[1] if match else name, stated)
         if match is None:
             if isinstance(found, list):
-                raise ScenarioError(f"{given}: this is a vector with {len(found)} elements; tune {given}[1], ...")
+                raise ScenarioError(f"{stated}: this is a vector with {len(found)} elements; tune {stated}[1], ...")
             start[name] = found
             continue
         if not isinstance(found, list):
-            raise ScenarioError(f"{given}: {match[1]} is one number and has no elements.")
-        place = _place(match, found, given)
+            raise ScenarioError(f"{stated}: {match[1]} is one number and has no elements.")
+        place = _place(match, found, stated)
         entries[name] = _Entry(match[1], place)
         start[name], vectors[match[1]] = found[place], found
         if match[3] is not None:
@@ -118,21 +118,23 @@ def _bounded(name: str, limits: Any) -> Bounded:
         raise ScenarioError(f"Bounds of {said}") from error
 
 
-def _place(match: re.Match[str], whole: Sequence[float], given: str) -> int:
+def _place(match: re.Match[str], whole: Sequence[float], stated: str) -> int:
     """Place of an element in its vector."""
     if match[3] is None:
         place = int(match[2]) - 1
     else:
         order = isqrt(len(whole))
         if order * order != len(whole):
-            raise ScenarioError(f"{given}: {match[1]} has {len(whole)} elements and is no square matrix; use [1] ... .")
+            raise ScenarioError(
+                f"{stated}: {match[1]} has {len(whole)} elements and is no square matrix; use [1] ... ."
+            )
         if match[2] != match[3]:
             raise ScenarioError(
-                f"{given}: of a matrix the diagonal is tuned, such as {match[1]}[{match[2]},{match[2]}]."
+                f"{stated}: of a matrix the diagonal is tuned, such as {match[1]}[{match[2]},{match[2]}]."
             )
         place = (int(match[2]) - 1) * (order + 1) if int(match[2]) <= order else len(whole)
     if not 0 <= place < len(whole):
-        raise ScenarioError(f"{given}: there is no such element; {match[1]} has {len(whole)}, the first is 1.")
+        raise ScenarioError(f"{stated}: there is no such element; {match[1]} has {len(whole)}, the first is 1.")
     return place
 
 
@@ -144,7 +146,7 @@ def _without_others(vectors: dict[str, Any], whole: str) -> str:
     return f"{whole}: entries off the diagonal are zero in all candidates; they were not." if others else ""
 
 
-def _present(scenario: Scenario, name: str, given: str) -> Any:
+def _present(scenario: Scenario, name: str, stated: str) -> Any:
     """Present value of a setting: a number, or a list of a vector.
 
     Raises:
@@ -153,7 +155,7 @@ def _present(scenario: Scenario, name: str, given: str) -> Any:
     table = scenario.table()
     head, _, rest = name.partition(".")
     if head not in table.components:
-        return _of_table(scenario, head, rest, given)
+        return _of_table(scenario, head, rest, stated)
     kind, dot, inner = rest.partition(".")
     if rest in COMPONENT_KEYS or (dot and kind in INNER and kind == "options"):
         return nan
@@ -162,28 +164,30 @@ def _present(scenario: Scenario, name: str, given: str) -> Any:
         head, table.components[head], scenario.folder, f"{scenario.where}: components.{head}"
     )
     set_value = table.components[head].parameters.get(variable)
-    return _start_of(component, variable, set_value, given)
+    return _start_of(component, variable, set_value, stated)
 
 
-def _of_table(scenario: Scenario, head: str, rest: str, given: str) -> float:
+def _of_table(scenario: Scenario, head: str, rest: str, stated: str) -> float:
     if head not in TABLES or not rest:
-        raise ScenarioError(f"cannot tune {given!r}: no component {head!r}; {nearest(head, _scenario_names(scenario))}")
+        raise ScenarioError(
+            f"cannot tune {stated!r}: no component {head!r}; {nearest(head, _scenario_names(scenario))}"
+        )
     value = getattr(getattr(scenario.table(), head, None), rest, None)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ScenarioError(f"cannot tune {given!r}: the scenario has no number there.")
+        raise ScenarioError(f"cannot tune {stated!r}: the scenario has no number there.")
     return float(value)
 
 
-def _start_of(component: DescribedComponent, variable: str, set_value: Any, given: str) -> Any:
+def _start_of(component: DescribedComponent, variable: str, set_value: Any, stated: str) -> Any:
     elements = [n for n in component.variables if n.startswith(f"{variable}[")]
     if variable not in component.variables and not elements:
         settable = [v.name for v in component.variables.values() if v.causality in ("parameter", "input")]
         known = dict.fromkeys(n.partition("[")[0] for n in settable)
-        raise ScenarioError(f"cannot tune {given!r}: {component.name} has no {variable!r}; {nearest(variable, known)}")
+        raise ScenarioError(f"cannot tune {stated!r}: {component.name} has no {variable!r}; {nearest(variable, known)}")
     try:
         first = component.settable(elements[0] if elements else variable)
     except CosimError as error:
-        raise ScenarioError(f"cannot tune {given!r}: {error}") from error
+        raise ScenarioError(f"cannot tune {stated!r}: {error}") from error
     if isinstance(set_value, list):
         return [float(v) for v in set_value]
     if elements:

@@ -73,7 +73,7 @@ def seeded(scenario: Scenario, seed: int, observer: str | None, heads: Sequence[
 
 
 def with_observer(scenario: Scenario, name: str) -> tuple[Scenario, str]:
-    """The scenario with an observer that it is judged by: its own, or a shipped one that listens as its observers do.
+    """The scenario with an observer that it is evaluated by: its own, or a shipped one that listens as those do.
 
     Args:
         scenario: the scenario. name: of a component, or of a shipped observer.

@@ -17,7 +17,7 @@ from fmu_observer.design.optimisers.search_space import SearchSpace
 from plant_models.hybrid import PeriodicEvent
 
 Array = np.ndarray
-SAME = 1e-9
+EQUAL_WITHIN = 1e-9
 """Relative: how far the traced value may be from that of the run, the same operations in another order."""
 INSTANT = 1e-9
 """Instants within this are one [s]."""
@@ -62,9 +62,9 @@ def _accumulated(found: Replays, asked: Tunable) -> AccumulatedOutput:
     """The log-likelihood over one recording as a function of all parameters that are tuned."""
     replay, before = found.replay, f"{found.observer}."
     values = replay.parameters()
-    for name, given in asked.settings(asked.start).items():  # a matrix whose other entries are zero in all candidates
+    for name, stated in asked.settings(asked.start).items():  # a matrix whose other entries are zero in all candidates
         bare = name.removeprefix(before)
-        values |= {bare: given} if bare in values else {f"{bare}[{i + 1}]": v for i, v in enumerate(given)}
+        values |= {bare: stated} if bare in values else {f"{bare}[{i + 1}]": v for i, v in enumerate(stated)}
     names = []
     for name in asked.space.names:
         entry = asked.entries.get(name)
@@ -76,7 +76,7 @@ def _accumulated(found: Replays, asked: Tunable) -> AccumulatedOutput:
         raise NoSlopesError(f"{replay.system.name} cannot be differentiated ({error})") from error
     run = next(found.outcomes([asked.settings(asked.start)]))
     expected = float(run[f"{before}{LIKELIHOOD}"][-1]) if not isinstance(run, str) else np.nan
-    if not (abs(traced - expected) <= SAME * max(abs(expected), 1.0) and np.isfinite(slopes).all()):
+    if not (abs(traced - expected) <= EQUAL_WITHIN * max(abs(expected), 1.0) and np.isfinite(slopes).all()):
         raise NoSlopesError(f"the traced likelihood at the start is {traced:.9g}, that of the run {expected:.9g}")
     return made
 

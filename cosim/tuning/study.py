@@ -1,4 +1,4 @@
-"""A study: searches over training seeds, what they cannot see, and the judgement of the best with other seeds."""
+"""A study: searches over training seeds, what they cannot see, and the validation of the best with other seeds."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Study:
     """Searches of one scenario.
 
     Args:
-        scenario: that is tuned. asked: what is tuned. evaluator: gives costs. training, judging: seeds.
+        scenario: that is tuned. asked: what is tuned. evaluator: gives costs. training, validation: seeds.
         method: of the search. options: of the method.
         iterations: populations after the first one. progress: see `tune`.
 
@@ -45,7 +45,7 @@ class Study:
         asked: Tunable,
         evaluator: Evaluator,
         training: Sequence[int],
-        judging: Sequence[int],
+        validation: Sequence[int],
         *,
         method: str,
         options: Mapping[str, Any],
@@ -53,7 +53,7 @@ class Study:
         progress: Progress | None,
     ) -> None:
         self.scenario, self.asked, self.evaluator = scenario, asked, evaluator
-        self.training, self.judging = training, judging
+        self.training, self.validation = training, validation
         self.method, self.iterations = method, iterations
         self.options = {name: value for name, value in options.items() if name != "gradients"}  # found out here
         self.done: list[Searched] = []
@@ -62,7 +62,7 @@ class Study:
         _make_optimiser(method, asked.space, 0, options)  # refused before anything is run
 
     def run(self, searches: int, how: str) -> Tuning:
-        """Search, and judge the best of all searches.
+        """Search, and validate the best of all searches.
 
         Args:
             searches: how many, with optimiser seeds 0, 1, ... how: in what candidates are run, in words.
@@ -79,7 +79,7 @@ class Study:
         interrupted = self._search_all(searches, fixed)
         winner = min(self.done, key=lambda search: search.costs[-1])
         better = dict(winner.best) if winner.costs[-1] < before.mean() else None
-        judged = self._judged(better, before.tolist(), () if interrupted else self.judging)
+        validated = self._validated(better, before.tolist(), () if interrupted else self.validation)
         at_best = None if interrupted or better is None else self._directions(better)
         remarks = [_NOTHING_BETTER] if better is None else at_bounds(self.asked.space, better, why)
         return Tuning(
@@ -94,7 +94,7 @@ class Study:
             warnings=[*remarks, *self._warnings(shown, at_best)],
             fixed=why,
             interrupted=interrupted,
-            **judged,
+            **validated,
         )
 
     def _search_all(self, searches: int, fixed: Mapping[str, float]) -> bool:
@@ -109,18 +109,20 @@ class Study:
             return True
         return False
 
-    def _judged(self, better: dict[str, float] | None, before: list[float], judging: Sequence[int]) -> dict[str, Any]:
-        """Costs before and after, with training seeds and with those that judge; None where nothing is better."""
-        self._bar.text = "judge"
+    def _validated(
+        self, better: dict[str, float] | None, before: list[float], validation: Sequence[int]
+    ) -> dict[str, Any]:
+        """Costs before and after, with training seeds and with those of validation; None where nothing is better."""
+        self._bar.text = "validate"
         after = self.evaluator.costs([better], self.training, {"search": "after"}, self._bar.step)[0]
-        judged = self.evaluator.costs([None, better], judging, {"search": "judge"}, self._bar.step)
+        validated = self.evaluator.costs([None, better], validation, {"search": "validate"}, self._bar.step)
         return {
             "seeds": self.training,
-            "judged": judging,
+            "validated": validation,
             "before": before,
             "after": after.tolist(),
-            "judged_before": judged[0].tolist(),
-            "judged_after": judged[1].tolist(),
+            "validated_before": validated[0].tolist(),
+            "validated_after": validated[1].tolist(),
         }
 
     def _tuned(self, better: dict[str, float] | None) -> Scenario:

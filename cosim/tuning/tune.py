@@ -1,4 +1,4 @@
-"""`tune`: parameters of an observer, an FMU or a scenario, searched over training seeds and judged with others."""
+"""`tune`: parameters of an observer, an FMU or a scenario, searched over training seeds and validated with others."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def tune(
     method: str = "bbo",
     cost: str | Cost | Callable[[Outcome], float] = "state",
     seeds: Sequence[int] = (0,),
-    judge: Sequence[int] = (),
+    validate: Sequence[int] = (),
     iterations: int = 20,
     searches: int = 1,
     options: Mapping[str, Any] | None = None,
@@ -43,7 +43,7 @@ def tune(
     whole_runs: bool = False,
     progress: Progress | None = None,
 ) -> Tuning:
-    """Search parameters of a scenario for the smallest mean cost over training seeds, and judge the best with others.
+    """Search a scenario's parameters for the smallest mean cost over training seeds, and validate the best with others.
 
     All candidates see the same seeds (common random numbers). An observer that only listens runs beside a recording of
     the plant side of each seed.
@@ -54,7 +54,7 @@ def tune(
         observer: component that is tuned, or a shipped observer that joins the scenario for it. method: one of
             `OPTIMISERS`, such as ``bbo`` or ``cma``. cost: see `cosim.tuning.costs.make_cost`.
         seeds: for training; each moves the seed of the scenario by so much, 0 is the scenario as it is.
-        judge: seeds that compare before and after at the end.
+        validate: seeds that compare before and after at the end.
         iterations: populations after the first one. options: of the optimiser, such as ``{"population": 30}``.
         searches: how many times it is searched, with optimiser seeds 0, 1, ...; the best counts, all are reported.
         workers: processes at a time; a script whose own classes run in them needs ``if __name__ == "__main__":``.
@@ -73,14 +73,14 @@ def tune(
     """
     if observer is not None:
         scenario, observer = with_observer(scenario, observer)
-    asked, (training, judging) = tunable(scenario, observer, parameters), _seeds(seeds, judge)
-    judged_by = make_cost(cost, observer, _outputs(scenario, observer))
+    asked, (training, validation) = tunable(scenario, observer, parameters), _seeds(seeds, validate)
+    weighed_by = make_cost(cost, observer, _outputs(scenario, observer))
     with _folder(directory, resume) as folder:
-        by_seed, how = _by_seed(scenario, observer, asked, (*training, *judging), whole_runs)
+        by_seed, how = _by_seed(scenario, observer, asked, (*training, *validation), whole_runs)
         where: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "resume": resume, "retry": retry}
         more: dict[str, Any] = {"options": options or {}, "iterations": iterations, "progress": progress}
-        with Evaluator(by_seed, asked, judged_by, folder, observer=observer, **where) as evaluator:
-            study = Study(scenario, asked, evaluator, training, judging, method=method, **more)
+        with Evaluator(by_seed, asked, weighed_by, folder, observer=observer, **where) as evaluator:
+            study = Study(scenario, asked, evaluator, training, validation, method=method, **more)
             found = study.run(searches, how)
         if directory is not None:
             write_tuning(found, asked.settings(found.best), folder)
@@ -107,18 +107,18 @@ def _by_seed(
     return found, f"of the whole scenario: {'as asked for' if whole_runs else why_whole(scenario, observer, heads)}"
 
 
-def _seeds(seeds: Sequence[int], judge: Sequence[int]) -> tuple[list[int], list[int]]:
-    training, judging = list(dict.fromkeys(seeds)), list(dict.fromkeys(judge))
+def _seeds(seeds: Sequence[int], validate: Sequence[int]) -> tuple[list[int], list[int]]:
+    training, validation = list(dict.fromkeys(seeds)), list(dict.fromkeys(validate))
     if not training:
         raise ScenarioError("There are no training seeds; give at least one.")
-    if both := sorted(set(training) & set(judging)):
+    if both := sorted(set(training) & set(validation)):
         raise ScenarioError(
-            f"Seeds {', '.join(map(str, both))} stand among training and judging seeds; what was learnt by heart "
-            "cannot be judged by them. Give others."
+            f"Seeds {', '.join(map(str, both))} stand among training and validation seeds; what was learnt by heart "
+            "cannot be validated by them. State others."
         )
-    if min(training + judging) < 0:
+    if min(training + validation) < 0:
         raise ScenarioError("Seeds are whole numbers from 0.")
-    return training, judging
+    return training, validation
 
 
 def _outputs(scenario: Scenario, observer: str | None) -> list[str]:

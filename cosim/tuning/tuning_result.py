@@ -1,5 +1,5 @@
-"""What tuning leaves: the best candidate of each search, costs with training and judging seeds, warnings, as text and
-plain data.
+"""What tuning leaves: the best candidate of each search, costs with training and validation seeds, warnings, as text
+and plain data.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ class Tuning(Readable):
     Args:
         scenario: with the best values. method: name of the optimiser. cost: in words.
         searches: one for each seed of the optimiser. start: values before, by name. best: values after.
-        seeds, judged: training and judging seeds.
+        seeds, validated: training and validation seeds.
         before, after: costs with the training seeds, one each; of the scenario as it was, and of the best candidate.
-        judged_before, judged_after: likewise with the judging seeds.
+        validated_before, validated_after: likewise with the validation seeds.
         runs: made in all. how: in what the candidates were run, in words.
         warnings: what the user should know. fixed: parameters that were held, and why.
         interrupted: whether somebody stopped it.
@@ -68,11 +68,11 @@ class Tuning(Readable):
     start: Mapping[str, float]
     best: Mapping[str, float]
     seeds: Sequence[int]
-    judged: Sequence[int]
+    validated: Sequence[int]
     before: Sequence[float]
     after: Sequence[float]
-    judged_before: Sequence[float]
-    judged_after: Sequence[float]
+    validated_before: Sequence[float]
+    validated_after: Sequence[float]
     runs: int
     how: str
     warnings: Sequence[str] = ()
@@ -81,23 +81,25 @@ class Tuning(Readable):
 
     @property
     def gain(self) -> Spread:
-        """Cost before minus after with the judging seeds, pair by pair; of the training seeds where none judge."""
-        pairs = zip(self.judged_before, self.judged_after, strict=True) if self.judged else None
+        """Cost before minus after with the validation seeds, pair by pair; of the training seeds without them."""
+        pairs = zip(self.validated_before, self.validated_after, strict=True) if self.validated else None
         pairs = pairs or zip(self.before, self.after, strict=True)
         return mean_of([float(b) - float(a) for b, a in pairs])
 
     def costs(self) -> Table:
         """A row for each kind of seeds: costs before and after, with 95 % intervals."""
         rows = [["training", len(self.seeds), mean_of(self.before), mean_of(self.after)]]
-        if self.judged:
-            rows.append(["judging", len(self.judged), mean_of(self.judged_before), mean_of(self.judged_after)])
+        if self.validated:
+            rows.append(
+                ["validation", len(self.validated), mean_of(self.validated_before), mean_of(self.validated_after)]
+            )
         return Table("costs", _COST_COLUMNS, rows, f"{self.method}: {self.cost}")
 
     def parts(self) -> Parts:
         """Costs before and after, spread over searches, values, warnings."""
         values = [[name, self.start.get(name), value] for name, value in self.best.items()]
-        luck = "The judging seeds do not show that the scenario has become better: what was learnt may be luck."
-        lines = [luck] if self.judged and not self.gain.low > 0.0 else []
+        luck = "The validation seeds do not show that the scenario has become better: what was learnt may be luck."
+        lines = [luck] if self.validated and not self.gain.low > 0.0 else []
         lines += [f"held: {name}, {why}" for name, why in self.fixed.items()]
         lines += [f"warning: {text}" for text in self.warnings]
         remarks = "\n".join([*lines, f"{self.runs} runs, {self.how}."])
@@ -125,9 +127,9 @@ class Tuning(Readable):
             "seeds": list(self.seeds),
             "before": list(self.before),
             "after": list(self.after),
-            "judged": list(self.judged),
-            "judged_before": list(self.judged_before),
-            "judged_after": list(self.judged_after),
+            "validated": list(self.validated),
+            "validated_before": list(self.validated_before),
+            "validated_after": list(self.validated_after),
             "searches": [
                 {"seed": s.seed, "best": dict(s.best), "costs": list(s.costs), "evaluations": list(s.evaluations)}
                 for s in self.searches

@@ -81,14 +81,14 @@ def random_runs(
     system = OBSERVERS[observer](missing=lost)
     batch = Batch(system, members, preset)
     batch.set("internal_step", 5e-3)  # its fourth order leaves 1e-9 m/s at poles of 3 1/s
-    told = {
+    reported = {
         "acceleration_max": xi,
         "odometer_error": unknown.noise,
         "unknown_acceleration": unknown.acceleration,
         "unknown_jerk_rate": unknown.jerk_rate,
         "start_position_error": 0.0,
     }
-    for name, value in told.items():
+    for name, value in reported.items():
         batch.set(name, value)
     start = true[:, 0]
     batch.set("estimated_speed", start[:, 1] + rng.uniform(-0.5, 0.5, members))

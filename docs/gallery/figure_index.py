@@ -1,7 +1,7 @@
 """The index of the theses: figure or table, the script that computes it, and whether the two agree. Standard library.
 
 What a row says follows from the lines that the sheet of the script has kept, and from nothing else: a published number
-agrees where the measured one is within `SAME` of it, a published statement where the same is found.
+agrees where the measured one is within `EQUAL_WITHIN` of it, a published statement where the same is found.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from line import SAME, unequal
+from line import EQUAL_WITHIN, unequal
 
 GALLERY = Path(__file__).parent
 STUDIES = GALLERY.parent / "studies"
@@ -62,7 +62,7 @@ def agreement(lines: list[dict[str, Any]]) -> str:
         more = f" ({len(others)} further reasons)" if len(others) > 1 else " (and one further reason)" if others else ""
         return f"**differs** in {len(off)} of {len(published)}, because {shortened(reason)}{more}"
     if published:
-        return f"agrees ({len(published)} within {SAME:.0%})"
+        return f"agrees ({len(published)} within {EQUAL_WITHIN:.0%})"
     return f"nothing published{beside_independent(lines)}"
 
 
@@ -75,8 +75,8 @@ def compared(lines: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], list[di
 def beside_independent(lines: list[dict[str, Any]]) -> str:
     """How many numbers agree with those of an implementation that shares no code with this package."""
     shared = [line for line in lines if line.get("independent") is not None]
-    same = sum(not unequal(line["measured"], line["independent"]) for line in shared)
-    return f"; {same} of {len(shared)} agree with an independent implementation" if shared else ""
+    equal = sum(not unequal(line["measured"], line["independent"]) for line in shared)
+    return f"; {equal} of {len(shared)} agree with an independent implementation" if shared else ""
 
 
 def shortened(reason: str) -> str:

@@ -233,11 +233,11 @@ class Verdicts:
     moving: np.ndarray
 
 
-def verdicts(run: Trains, jams: Jams, told: np.ndarray, after: float = 6.0, *, standing: bool = False) -> Verdicts:
+def verdicts(run: Trains, jams: Jams, reported: np.ndarray, after: float = 6.0, *, standing: bool = False) -> Verdicts:
     """Judge what was told (`odometer_fault`, shape (members, samples)), while the trains move, or all the time."""
-    t = PERIOD * np.arange(told.shape[1])
+    t = PERIOD * np.arange(reported.shape[1])
     moving = (run.v[:, :: round(PERIOD / STEP)] > STANDING) | standing
-    fault = (told > 0.5) & moving
+    fault = (reported > 0.5) & moving
     start, end = jams.onset, jams.onset + jams.length
     near = (t >= start[:, None] - 1e-9) & (t <= end[:, None] + GRACE)
     rises = np.diff(fault.astype(int), axis=1, prepend=0) > 0
@@ -247,11 +247,11 @@ def verdicts(run: Trains, jams: Jams, told: np.ndarray, after: float = 6.0, *, s
     ended = over.any(axis=1) & moving[np.arange(len(t_over := np.argmax(over, axis=1))), t_over]
     last = np.argmax(~moving, axis=1) - 1
     rest = np.where((~moving).any(axis=1), last, len(t) - 1)
-    judged = found & (end + ROOM < t[rest])
+    evaluated = found & (end + ROOM < t[rest])
     return Verdicts(
         found,
         np.where(found, t[first] - start, np.nan),
-        np.where(judged, np.where(ended, t[t_over] - end, np.inf), np.nan),
+        np.where(evaluated, np.where(ended, t[t_over] - end, np.inf), np.nan),
         (rises & ~near).sum(axis=1),
         fault[np.arange(len(rest)), rest],
         np.maximum(moving.sum(axis=1) * PERIOD - after, 0.0),

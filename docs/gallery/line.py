@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-SAME = 1e-2
+EQUAL_WITHIN = 1e-2
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Line:
         quantity: what it is, with its conditions. unit: of both numbers.
         published: as printed; None where the thesis prints none, a text where it tells a story.
         measured: what comes out here, a number or a text.
-        why: why they differ; required unless what is measured is within `SAME` of all others, and where there is none.
+        why: why they differ; required where what is measured is not within `EQUAL_WITHIN` of all others, or is alone.
         repeats: relative difference that another machine may show.
         independent: what an implementation gave that shares no code with this package; None where there is none.
     """
@@ -26,7 +26,7 @@ class Line:
     published: float | str | None
     measured: float | str
     why: str = ""
-    repeats: float = SAME
+    repeats: float = EQUAL_WITHIN
     independent: float | str | None = None
 
     def differs(self) -> bool:
@@ -40,10 +40,10 @@ class Line:
 
 
 def unequal(measured: float | str, other: float | str) -> bool:
-    """Whether two cells say different things: texts that are not the same, numbers further apart than `SAME`."""
+    """Whether two cells say different things: texts that are not equal, numbers further apart than `EQUAL_WITHIN`."""
     if isinstance(measured, str) or isinstance(other, str):
         return measured != other
-    return abs(measured - other) > SAME * abs(other)
+    return abs(measured - other) > EQUAL_WITHIN * abs(other)
 
 
 def table(lines: list[dict[str, Any]]) -> list[tuple[str, ...]]:

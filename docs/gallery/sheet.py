@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-from shared.line import SAME, Line, table
+from shared.line import EQUAL_WITHIN, Line, table
 from shared.small_picture import save_small
 
 from cosim.drawing.style import RC
@@ -51,7 +51,7 @@ class Sheet:
         measured: float | str,
         why: str = "",
         *,
-        repeats: float = SAME,
+        repeats: float = EQUAL_WITHIN,
         independent: float | str | None = None,
     ) -> None:
         """Add a line; see `Line`.

@@ -64,7 +64,7 @@ def learn_wheel_radius(members: int, count: int, true_error: float = 0.01, seed:
     speed = np.diff(position(np.concatenate([[-PERIOD], grid]))) / PERIOD
     speed[0] = SPEEDS[0]
     readings = (1.0 + true_error) * speed + ODOMETER_DEVIATION * rng.normal(size=(members, len(grid)))
-    told = groups + BALISE_DEVIATION * rng.normal(size=(members, count))
+    reported = groups + BALISE_DEVIATION * rng.normal(size=(members, count))
     batch = Batch("adaptive_wheel_radius", members)
     for name, value in {"balise_deviation": BALISE_DEVIATION, "odometer_deviation": ODOMETER_DEVIATION}.items():
         batch.set(name, value)
@@ -72,7 +72,7 @@ def learn_wheel_radius(members: int, count: int, true_error: float = 0.01, seed:
     batch.set("odometer", readings[:, 0])
     batch.start()
     who = np.repeat(np.arange(members), count)
-    batch.notify("balise", who, np.tile(instants, members), position=told.ravel())
+    batch.notify("balise", who, np.tile(instants, members), position=reported.ravel())
     names = ("wheel_radius_error", "wheel_radius_error_deviation")
     rows = batch.run(grid[1:], names, {"odometer": readings})
     behind = np.searchsorted(grid, instants)

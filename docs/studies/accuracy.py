@@ -19,7 +19,7 @@ from plant_models.hybrid import HybridSystem, Runtime, TracedSystem, scalar_name
 from plant_models.railway.vehicle.train import Train
 
 RTOL, ATOL = 1e-10, 1e-12
-SAME_PLACE = 1e-9  # [m] or [s]; a switching function closer to zero than this at an event has changed its sign
+EQUAL_PLACE = 1e-9  # [m] or [s]; a switching function closer to zero than this at an event has changed its sign
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Journey:
     plant: str
     what: str
     stop: float
-    looked_at: tuple[str, ...]
+    read: tuple[str, ...]
     values: Mapping[str, float] = field(default_factory=dict)
     factors: tuple[float, ...] = (4.0, 2.0, 1.0, 0.5)
 
@@ -81,7 +81,7 @@ def errors(journey: Journey, factors: tuple[float, ...] | None = None) -> list[d
     at = np.linspace(0.0, journey.stop, 101)[1:]
     runtime = _prepared(system, journey)
     truth = _outputs(runtime, at, _Solved(system, runtime).states(at))
-    names = journey.looked_at or scalar_names(system.outputs)
+    names = journey.read or scalar_names(system.outputs)
     columns = [scalar_names(system.outputs).index(name) for name in names]
     found = []
     for factor in factors or journey.factors:
@@ -191,10 +191,10 @@ class _Solved:
         n, held = len(self._system.frictions), held.copy()
         if not len(held):
             return held
-        held[n:] = self._call(self._balance, t, x, held).ravel()[2 * n :] >= -SAME_PLACE
+        held[n:] = self._call(self._balance, t, x, held).ravel()[2 * n :] >= -EQUAL_PLACE
         flows, frictions, _ = np.split(self._call(self._balance, t, x, held).ravel(), [n, 2 * n])
         for j, i in enumerate(self._system.friction_indices()):
-            pushed = abs(flows[j]) > frictions[j] * (1.0 - SAME_PLACE) and flows[j] != 0.0
+            pushed = abs(flows[j]) > frictions[j] * (1.0 - EQUAL_PLACE) and flows[j] != 0.0
             held[j] = np.sign(x[i]) if x[i] != 0.0 else np.sign(flows[j]) if pushed else 0.0
         return held
 
@@ -209,7 +209,7 @@ def table() -> str:
             step = row["internal_step"]
             mark = " (shipped)" if step == PLANTS[journey.plant]().internal_step else ""
             values = {n: v for n, v in row.items() if n != "internal_step"}
-            if not journey.looked_at:
+            if not journey.read:
                 name = max(values, key=lambda n: values[n])
                 values = {name: values[name]}
             said = ", ".join(f"{n} {v:.1e} {units[n]}" for n, v in values.items())

@@ -50,12 +50,12 @@ def scenario(*, everybody: bool = True, faults: bool = True, **changes: Any) -> 
 
 
 def _add_the_others(chosen: Scenario) -> None:
-    told = chosen.table().components["multirate_cdo"].parameters
-    train = {k: v for k, v in told.items() if k not in ("theta_2", "odometer_period")}
+    reported = chosen.table().components["multirate_cdo"].parameters
+    train = {k: v for k, v in reported.items() if k not in ("theta_2", "odometer_period")}
     placed = design_for_gap(LONGEST_TIME)
     by_gap = {"balise_gain": list(placed.gains), "balise_decay": placed.decay, "gps_gain": [0.0] * 4, "gps_decay": 0.0}
     others: dict[str, dict[str, Any]] = {
-        "differentiator_cdo": {**train, "theta": told["theta_2"]},
+        "differentiator_cdo": {**train, "theta": reported["theta_2"]},
         "augmented_high_gain_cdo": {
             **train,
             "theta_balise": 0.978 / LONGEST_TIME,
@@ -124,7 +124,7 @@ def all_gaps(found: GapErrors, quiet: GapErrors, other: GapErrors) -> str:
     return table(head, rows)
 
 
-def told(outcome: Outcome) -> list[list[str]]:
+def reported(outcome: Outcome) -> list[list[str]]:
     """Faults told and false alarms of the observers that tell any, as cells of a table."""
     known = [entry for entry in outcome.result.summary["fault_detection"] if entry["tells"]]
     return [[entry["observer"], f"{entry['detected']} of {entry['faults']}", f"{entry['false']}"] for entry in known]
@@ -138,7 +138,7 @@ def detections(outcome: Outcome, other: Outcome) -> str:
     """
     head = ["", "faults told", "false alarms", "turned: faults told", "false alarms"]
     return table(
-        head, [[f"`{one[0]}`", *one[1:], *two[1:]] for one, two in zip(told(outcome), told(other), strict=True)]
+        head, [[f"`{one[0]}`", *one[1:], *two[1:]] for one, two in zip(reported(outcome), reported(other), strict=True)]
     )
 
 
@@ -188,10 +188,10 @@ def tables() -> dict[str, str]:
     known = certified(outcome)
     head, line, *rows = all_gaps(found, quiet, other).splitlines()
     head += " certified for 22.5 s |"
-    judged = [f"{row} {known.get(name, '–')} |" for name, row in zip(found.errors, rows, strict=True)]
+    evaluated = [f"{row} {known.get(name, '–')} |" for name, row in zip(found.errors, rows, strict=True)]
     return {
         "longest gaps": longest_gaps(found),
-        "all gaps": "\n".join([head, f"{line} --- |", *judged]),
+        "all gaps": "\n".join([head, f"{line} --- |", *evaluated]),
         "turned": detections(outcome, other_outcome),
         "steps": step_table(),
     }

@@ -21,8 +21,8 @@ class SignOfOutput(Locomotive):
     """Acceleration with the other sign."""
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        given = super().output(t, x, u, p)
-        return {**given, "acceleration": -given["acceleration"]}
+        stated = super().output(t, x, u, p)
+        return {**stated, "acceleration": -stated["acceleration"]}
 
 
 class SignOfInput(Locomotive):
@@ -48,8 +48,8 @@ class _OtherWheelSpeed(Locomotive):
         self.outputs = _outputs(wheel_speed={"unit": self.unit, "display_unit": None})
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        given = super().output(t, x, u, p)
-        return {**given, "wheel_speed": self.factor * given["wheel_speed"]}
+        stated = super().output(t, x, u, p)
+        return {**stated, "wheel_speed": self.factor * stated["wheel_speed"]}
 
 
 class OtherUnit(_OtherWheelSpeed):
@@ -82,17 +82,17 @@ class Renamed(Locomotive):
     outputs = _outputs(slip={"name": "creepage"})
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        given = super().output(t, x, u, p)
-        slip = given.pop("slip")
-        return {**given, "creepage": slip}
+        stated = super().output(t, x, u, p)
+        slip = stated.pop("slip")
+        return {**stated, "creepage": slip}
 
 
 class Swapped(Locomotive):
     """Two forces in each other's place."""
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        given = super().output(t, x, u, p)
-        return {**given, "adhesion_force": given["gradient_force"], "gradient_force": given["adhesion_force"]}
+        stated = super().output(t, x, u, p)
+        return {**stated, "adhesion_force": stated["gradient_force"], "gradient_force": stated["adhesion_force"]}
 
 
 class Dropped(Locomotive):
@@ -101,9 +101,9 @@ class Dropped(Locomotive):
     outputs = _outputs("gradient_force")
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        given = super().output(t, x, u, p)
-        del given["gradient_force"]
-        return given
+        stated = super().output(t, x, u, p)
+        del stated["gradient_force"]
+        return stated
 
 
 class Added(Locomotive):
@@ -168,5 +168,5 @@ class OneSampleLate(Locomotive):
         }
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        given = super().output(t, x, u, p)
-        return {**given, "speed": x.former_speed, "wheel_speed": x.former_wheel_speed}
+        stated = super().output(t, x, u, p)
+        return {**stated, "speed": x.former_speed, "wheel_speed": x.former_wheel_speed}

@@ -131,11 +131,11 @@ def _stop(stand: float, teeth: int, noise: float, fault: str, members: int) -> s
     read = readings(run, faults, noise, rng, True)
     read = counted(read, teeth)
     case, sensor = CASES["3.3.4"]._replace(speed=20.0), {"noise": noise, "teeth": teeth}
-    told = observe(case, run, read, effort=effort, with_balises=False, **sensor)
-    v = verdicts(run, faults, told["odometer_fault"], standing=True)
+    reported = observe(case, run, read, effort=effort, with_balises=False, **sensor)
+    v = verdicts(run, faults, reported["odometer_fault"], standing=True)
     missed, false, hours = int((~v.found).sum()), int(v.false.sum()), float(v.moving.sum()) / 3600.0
     share, few = clopper_pearson(missed, members), garwood(false, hours)
-    error = np.abs(told["position"] - at_samples(run.p))[:, -1]
+    error = np.abs(reported["position"] - at_samples(run.p))[:, -1]
     alone = np.abs(odometer_error(at_samples(run.p), read, np.inf))[:, -1]
     return (
         f"{100 * missed / members:.1f} ({100 * share[0]:.1f} to {100 * share[1]:.1f}) | {number(false / hours)} "
@@ -173,9 +173,9 @@ def stuck_table(members: int = 100) -> str:
         window = (t > 17.0) & (run.v[:, ::every].min(axis=0) > 1.0)
         error = np.abs(found["position"] - run.p[:, ::every])[:, window].max()
         alone = np.abs(odometer_error(run.p[:, ::every], read, 200.0 if with_balises else np.inf)[:, window]).max()
-        told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
+        reported = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
         side, laid = "low" if fault == "jam" else "high", "every 200 m" if with_balises else "none"
-        lines.append(f"| {100 * depth:g} % {side} | {laid} | {told:.0f} | {error:.1f} | {alone:.1f} |")
+        lines.append(f"| {100 * depth:g} % {side} | {laid} | {reported:.0f} | {error:.1f} | {alone:.1f} |")
     return "\n".join(lines)
 
 
@@ -197,9 +197,9 @@ def micro_table(members: int = 200) -> str:
         found = observe(case, run, read, noise=NOISE)
         window = (t > 20.0) & (run.v[:, ::every].min(axis=0) > 1.0)
         error = np.abs(found["position"] - run.p[:, ::every])[:, window].max()
-        told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
+        reported = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
         alone = np.abs(odometer_error(run.p[:, ::every], read, 200.0)[:, window]).max()
-        lines.append(f"| {200 * abs(share):g} ms | {100 * share:g} | {told:.0f} | {error:.1f} | {alone:.1f} |")
+        lines.append(f"| {200 * abs(share):g} ms | {100 * share:g} | {reported:.0f} | {error:.1f} | {alone:.1f} |")
     return "\n".join(lines)
 
 

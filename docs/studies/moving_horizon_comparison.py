@@ -191,8 +191,8 @@ def add_filters(chosen: Scenario) -> dict[str, str]:
             f"GTSAM, fixed lag of {WINDOW * PERIOD:g} s",
             {"observer": FactorGraphSmoother, "parameters": FILTER},
         )
-    for name, (label, given) in own.items():
-        chosen.add(name, label=label, **given)
+    for name, (label, stated) in own.items():
+        chosen.add(name, label=label, **stated)
         odometer = "measured_odometer" if name == "ukf" else "odometer"
         chosen.connect(f"driver.effort -> {name}.effort", f"odometer.reading -> {name}.{odometer}")
     return {name: label for name, (label, _) in own.items()}

@@ -41,9 +41,9 @@ HEADING = (
 class ClarabelProgram(WindowProgram):
     """The quadratic programme handed to Clarabel."""
 
-    def handed(self, given: Programme) -> tuple[np.ndarray, np.ndarray, str]:
+    def handed(self, stated: Programme) -> tuple[np.ndarray, np.ndarray, str]:
         """See `WindowProgram.handed`; no disturbance has bounds here."""
-        h, g, a, (right, _), lower, upper = given
+        h, g, a, (right, _), lower, upper = stated
         P, E = _matrix(self.cost, h), _matrix(self.transitions, a)
         eye = scipy.sparse.eye(len(g), format="csr")
         has_low, has_high = np.isfinite(lower), np.isfinite(upper)
@@ -52,9 +52,9 @@ class ClarabelProgram(WindowProgram):
         cones = [clarabel.ZeroConeT(len(right)), clarabel.NonnegativeConeT(len(limits) - len(right))]
         settings = clarabel.DefaultSettings()
         settings.verbose, settings.tol_gap_abs, settings.tol_feas = False, 1e-9, 1e-9
-        told = clarabel.DefaultSolver(scipy.sparse.triu(P, format="csc"), g, rows, limits, cones, settings).solve()
-        status = "SOLVER_RET_SUCCESS" if "Solved" in str(told.status) else str(told.status)
-        return np.array(told.x), np.array(told.z)[: len(right)], status
+        reported = clarabel.DefaultSolver(scipy.sparse.triu(P, format="csc"), g, rows, limits, cones, settings).solve()
+        status = "SOLVER_RET_SUCCESS" if "Solved" in str(reported.status) else str(reported.status)
+        return np.array(reported.x), np.array(reported.z)[: len(right)], status
 
 
 class IpoptProgram(WindowProgram):
@@ -70,21 +70,21 @@ class IpoptProgram(WindowProgram):
         problem = {"x": z, "p": ca.vertcat(g, h, a), "f": cost, "g": ca.MX(self.transitions, a) @ z}
         self._ipopt = ca.nlpsol("window", "ipopt", problem, options)
 
-    def handed(self, given: Programme) -> tuple[np.ndarray, np.ndarray, str]:
+    def handed(self, stated: Programme) -> tuple[np.ndarray, np.ndarray, str]:
         """See `WindowProgram.handed`; no disturbance has bounds here."""
-        h, g, a, (least, most), lower, upper = given
+        h, g, a, (least, most), lower, upper = stated
         p = np.concatenate([g, h, a])
-        told = self._ipopt(x0=np.zeros(len(g)), p=p, lbx=lower, ubx=upper, lbg=least, ubg=most)
+        reported = self._ipopt(x0=np.zeros(len(g)), p=p, lbx=lower, ubx=upper, lbg=least, ubg=most)
         status = str(self._ipopt.stats()["unified_return_status"])
-        return told["x"].full().ravel(), told["lam_g"].full().ravel(), status
+        return reported["x"].full().ravel(), reported["lam_g"].full().ravel(), status
 
 
 class TrustRegionProgram(WindowProgram):
     """The same programme as bounded least squares of SciPy: equations weighted by 1e6, `lsq_linear` with LSMR."""
 
-    def handed(self, given: Programme) -> tuple[np.ndarray, np.ndarray, str]:
+    def handed(self, stated: Programme) -> tuple[np.ndarray, np.ndarray, str]:
         """See `WindowProgram.handed`; no disturbance has bounds here."""
-        h, g, a, (right, _), lower, upper = given
+        h, g, a, (right, _), lower, upper = stated
         size = len(g)
         blocks = h[: size // 2 * self.order].reshape(self.count, self.order, self.order)
         values, vectors = np.linalg.eigh(blocks)
@@ -140,8 +140,10 @@ def parameters() -> np.ndarray:
     """Parameters of the train observer, its bound of the disturbance tight."""
     system = BaliseMovingHorizon()
     values = system.unpack_parameters(system.start_parameters())
-    told = {name: float(getattr(values, name)) for name in Shared._fields} | {"disturbance_limit": DISTURBANCE_LIMIT}
-    return np.array(list(told.values()))
+    reported = {name: float(getattr(values, name)) for name in Shared._fields} | {
+        "disturbance_limit": DISTURBANCE_LIMIT
+    }
+    return np.array(list(reported.values()))
 
 
 def warm_started(
@@ -185,9 +187,9 @@ def main() -> None:
             continue
         off = max(float(np.abs((f.states - r.states) / scale).max()) for f, r in zip(found, reference, strict=False))
         steps = np.mean([f.iterations for f in found])
-        told = f"{sum(f.converged for f in found)} of {len(found)}"
+        reported = f"{sum(f.converged for f in found)} of {len(found)}"
         rows.append(
-            [name, f"{1e3 * np.median(spent):.1f}", f"{1e3 * max(spent):.1f}", f"{steps:.1f}", f"{off:.0e}", told]
+            [name, f"{1e3 * np.median(spent):.1f}", f"{1e3 * max(spent):.1f}", f"{steps:.1f}", f"{off:.0e}", reported]
         )
     lines = [HEADING, ["---"] * len(HEADING), *rows]
     text = "\n".join(f"| {' | '.join(line)} |" for line in lines)

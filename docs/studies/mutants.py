@@ -56,16 +56,16 @@ def parameter_mutations(share: float) -> Iterator[Mutation]:
     be.
     """
     for signal in LOCOMOTIVE.parameters:
-        given = PARAMETERS.get(signal.name, signal.start)
-        values = np.atleast_1d(np.asarray(given, dtype=float))
+        stated = PARAMETERS.get(signal.name, signal.start)
+        values = np.atleast_1d(np.asarray(stated, dtype=float))
         for k in range(values.size):
             name = signal.name if signal.size is None else f"{signal.name}[{k + 1}]"
             at_most = signal.max is not None and values[k] * (1.0 + share) > signal.max
             factor = 1.0 - share if at_most else 1.0 + share
             value = (values * np.where(np.arange(values.size) == k, factor, 1.0)).tolist()
             changed = {signal.name: value[0] if signal.size is None else value}
-            group, told = f"parameters, {100.0 * share:g} %", f"`{name}` {100.0 * (factor - 1.0):+g} %"
-            yield Mutation(group, told, _under(parameters=changed), WITHOUT_INFLUENCE.get(name, SMALL))
+            group, reported = f"parameters, {100.0 * share:g} %", f"`{name}` {100.0 * (factor - 1.0):+g} %"
+            yield Mutation(group, reported, _under(parameters=changed), WITHOUT_INFLUENCE.get(name, SMALL))
 
 
 def condition_mutations() -> Iterator[Mutation]:

@@ -16,7 +16,7 @@ from pathlib import Path
 from mutants import all_mutations
 from repetitions import other_steps, repetitions
 from tqdm import tqdm
-from verdicts import DEFAULT, RELATIVE, Row, counted, judge
+from verdicts import DEFAULT, RELATIVE, Row, counted, evaluate
 
 PAGE = Path(__file__).parents[1] / "reference" / "mutation_study.md"
 PART = r"(<!-- generated: {name} -->\n)(.*?)(<!-- end -->)"
@@ -25,26 +25,28 @@ WORDS = {False: "no", True: "yes"}
 
 def main() -> None:
     """Run everything and rewrite the page."""
-    with judge() as judged:
-        changes = [judged.mutation(mutation) for mutation in tqdm(all_mutations(), desc="changes")]
-        beside = judged.not_nested()
-        same = [row for r in tqdm([*repetitions(), *other_steps()], desc="repetitions") for row in judged.repetition(r)]
+    with evaluate() as evaluated:
+        changes = [evaluated.mutation(mutation) for mutation in tqdm(all_mutations(), desc="changes")]
+        beside = evaluated.not_nested()
+        equal = [
+            row for r in tqdm([*repetitions(), *other_steps()], desc="repetitions") for row in evaluated.repetition(r)
+        ]
     text = PAGE.read_text(encoding="utf-8")
-    for name, content in parts(changes, same, beside).items():
+    for name, content in parts(changes, equal, beside).items():
         text = re.sub(PART.format(name=name), lambda m, c=content: m[1] + c + m[3], text, flags=re.DOTALL)  # type: ignore[misc]
     PAGE.write_text(text, encoding="utf-8", newline="\n")
-    print(f"{PAGE.name}: {counted(r for r in changes if not r.harmless)} caught, {counted(same)} false alarms")
+    print(f"{PAGE.name}: {counted(r for r in changes if not r.harmless)} caught, {counted(equal)} false alarms")
 
 
-def parts(changes: Sequence[Row], same: Sequence[Row], beside: Row) -> Mapping[str, str]:
+def parts(changes: Sequence[Row], equal: Sequence[Row], beside: Row) -> Mapping[str, str]:
     """The generated parts of the page by name."""
     harmful, harmless = ([row for row in changes if row.harmless is kind] for kind in (False, True))
     return {
-        "summary": summary(harmful, harmless, same),
+        "summary": summary(harmful, harmless, equal),
         "changes": "".join(f"### {group.capitalize()}\n\n{table(rows)}\n" for group, rows in grouped(harmful).items()),
         "not caught": not_caught(harmful),
         "harmless": table(harmless),
-        "same": repeated(same),
+        "same": repeated(equal),
         "not nested": f"{beside.change.capitalize()}: {beside.found or 'nothing found'}, {beside.size}.\n",
     }
 
@@ -57,14 +59,14 @@ def grouped(rows: Iterable[Row]) -> dict[str, list[Row]]:
     return groups
 
 
-def summary(harmful: Sequence[Row], harmless: Sequence[Row], same: Sequence[Row]) -> str:
+def summary(harmful: Sequence[Row], harmless: Sequence[Row], equal: Sequence[Row]) -> str:
     """How many are caught, at each tolerance."""
     lines = [f"| relative tolerance | {_tolerances()} |", f"|---|{'---|' * len(RELATIVE)}"]
     for group, rows in grouped(harmful).items():
         lines.append(_counts(f"{group}: caught of {len(rows)}", rows))
     lines.append(_counts(f"**all: caught of {len(harmful)}**", harmful))
     lines.append(_counts(f"harmless changes: caught of {len(harmless)}", harmless))
-    lines.append(_counts(f"unchanged runs and other steps: false alarms in {len(same)} comparisons", same))
+    lines.append(_counts(f"unchanged runs and other steps: false alarms in {len(equal)} comparisons", equal))
     return "\n".join([*lines, ""])
 
 

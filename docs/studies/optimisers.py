@@ -55,8 +55,8 @@ class Drive:
 
     def cost(self, variances: np.ndarray) -> np.ndarray:
         """Costs, shape (m,), of variances, shape (m, 6)."""
-        given = {"process_variance": variances[:, :4], "measurement_variance": variances[:, 4:]}
-        found = self.replay.run(CURRENTS, given, members=len(variances))
+        stated = {"process_variance": variances[:, :4], "measurement_variance": variances[:, 4:]}
+        found = self.replay.run(CURRENTS, stated, members=len(variances))
         errors = (found - self.true)[:, 1:]
         return np.asarray((errors**2).mean(axis=1).sum(axis=1))
 
@@ -119,7 +119,7 @@ def likelihood(drive: Drive) -> AccumulatedOutput:
 
 def gradient_searches(drive: Drive, seeds: Sequence[int]) -> list[Search]:
     """Descents along the likelihood; the cost in the tables is that of the currents at the same candidates."""
-    box, told, found = space(True), likelihood(drive), []
+    box, reported, found = space(True), likelihood(drive), []
     for seed in seeds:
         optimiser = find_optimiser(GRADIENT.name)(box.lower, box.upper, seed=seed, gradients=True)  # type: ignore[call-arg]
         points: list[np.ndarray] = []
@@ -128,7 +128,7 @@ def gradient_searches(drive: Drive, seeds: Sequence[int]) -> list[Search]:
             if not len(candidates):
                 break
             values = box.values(candidates)[0]
-            height, slope = told(values)
+            height, slope = reported(values)
             optimiser.tell(candidates, [-height], [-slope * values])  # by the logarithm
             points.append(values)
         costs = np.minimum.accumulate(drive.cost(np.array(points)))

@@ -73,7 +73,7 @@ NOT_HERE: Mapping[str, str] = {
 }
 """Train observers that stand in no run of this study, with the reason."""
 _NAMED = {*NOT_HERE, *(name for name, _ in _LABELLED.values())}
-JUDGED: Mapping[str, tuple[str, str | None]] = {
+EVALUATED: Mapping[str, tuple[str, str | None]] = {
     **_LABELLED,
     **{name: (name, None) for name in OBSERVERS if OBSERVERS.room(name).endswith(".train") and name not in _NAMED},
 }
@@ -84,8 +84,8 @@ class Situation:
     """A journey.
 
     Attributes:
-        name: of the row. right: whether the odometer is right. mass: of the train [kg]. told: share of the mass that
-            observers believe. drag: share of the resistance that they believe. spacing: of balises [m]. slope: its
+        name: of the row. right: whether the odometer is right. mass: of the train [kg]. reported: share of the mass
+            that observers believe. drag: share of the resistance that they believe. spacing: of balises [m]. slope: its
             sections, position [m] and gradient. noise: of a reading [m/s]. loss: share of readings that is lost.
         faults: onset [s], length [s], depth, kind (-1 jam, 1 skid). turned: whether they act with the other sign.
     """
@@ -93,7 +93,7 @@ class Situation:
     name: str
     right: bool = True
     mass: float = 400e3
-    told: float = 1.0
+    reported: float = 1.0
     drag: float = 1.0
     spacing: float = 500.0
     slope: Sequence[tuple[float, float]] = field(default=((0.0, 0.0),))
@@ -111,15 +111,15 @@ SITUATIONS = (
     Situation("400 t, level"),
     Situation("400 t, 6 per mille up", slope=UP),
     Situation("400 t, 6 per mille down", slope=DOWN),
-    Situation("400 t, told 20 % more mass", told=1.2),
-    Situation("400 t, told 20 % less mass", told=0.8),
-    Situation("400 t, 6 per mille up, told 20 % more", told=1.2, slope=UP),
+    Situation("400 t, told 20 % more mass", reported=1.2),
+    Situation("400 t, told 20 % less mass", reported=0.8),
+    Situation("400 t, 6 per mille up, told 20 % more", reported=1.2, slope=UP),
     Situation("400 t, told half of the resistance", drag=0.5),
     Situation("2000 t, hills of 8 per mille", mass=2000e3, slope=HILLS),
     Situation("balises every 0.3 s", spacing=6.0),
     Situation("no balise for 199 s", spacing=1e4),
     Situation("noise of 0.05 m/s", noise=0.05),
-    Situation("noise of 0.1 m/s, hills, told 10 % less", noise=0.1, told=0.9, slope=HILLS),
+    Situation("noise of 0.1 m/s, hills, told 10 % less", noise=0.1, reported=0.9, slope=HILLS),
     Situation("three readings in ten lost", right=False, loss=0.3),
     Situation("jams and skids", right=False, faults=FAULTS),
     Situation("the same of the other sign", right=False, faults=FAULTS, turned=True),
@@ -148,8 +148,10 @@ def scenario_of(s: Situation, labels: Iterable[str]) -> Scenario:
     made.add("odometer", model="odometer", parameters={"sample_period": PERIOD, "noise_std": s.noise})
     if s.faults:
         onset, length, depth, kind = (list(column) for column in zip(*s.faults, strict=True))
-        given = {"fault_onset": onset, "fault_length": length, "fault_depth": depth, "fault_kind": kind}
-        made.add("wheel", model="wheel_fault", options={"cause": "given", "fault_count": len(onset)}, parameters=given)
+        stated = {"fault_onset": onset, "fault_length": length, "fault_depth": depth, "fault_kind": kind}
+        made.add(
+            "wheel", model="wheel_fault", options={"cause": "stated", "fault_count": len(onset)}, parameters=stated
+        )
         made.connect("driver.effort -> wheel.effort", "train.wheel_speed -> wheel.speed")
     made.connect(f"{'wheel' if s.faults else 'train'}.wheel_speed -> odometer.wheel_speed")
     if s.loss:
@@ -162,19 +164,19 @@ def scenario_of(s: Situation, labels: Iterable[str]) -> Scenario:
 
 
 def _add_observer(made: Scenario, label: str, s: Situation, davis: Mapping[str, float]) -> None:
-    name, preset = JUDGED[label]
+    name, preset = EVALUATED[label]
     system: HybridSystem = OBSERVERS[name]()
-    told = {"mass": s.told * s.mass, "odometer_period": PERIOD, "estimated_speed": 0.0, "odometer_speed": 0.0}
-    told |= {key: s.drag * value for key, value in davis.items()}
+    reported = {"mass": s.reported * s.mass, "odometer_period": PERIOD, "estimated_speed": 0.0, "odometer_speed": 0.0}
+    reported |= {key: s.drag * value for key, value in davis.items()}
     known = {signal.name for signal in (*system.parameter_signals, *system.states)}
     chosen: dict[str, Any] = {} if preset is None else {"preset": preset}
-    made.add(label, observer=name, parameters={k: v for k, v in told.items() if k in known}, **chosen)
+    made.add(label, observer=name, parameters={k: v for k, v in reported.items() if k in known}, **chosen)
     made.connect(f"odometer.reading -> {label}.odometer")
     if any(signal.name == "effort" for signal in system.inputs):
         made.connect(f"driver.effort -> {label}.effort")
 
 
-def errors(s: Situation, labels: Sequence[str] = tuple(JUDGED)) -> dict[str, float]:
+def errors(s: Situation, labels: Sequence[str] = tuple(EVALUATED)) -> dict[str, float]:
     """Largest position error by observer [m].
 
     Args:
@@ -187,7 +189,7 @@ def errors(s: Situation, labels: Sequence[str] = tuple(JUDGED)) -> dict[str, flo
 
 def table() -> str:
     """The table: the odometer's own error, and that of the others as a multiple of it."""
-    heading = ["", f"`{RESET}` [m]", *(f"`{label}`" for label in JUDGED if label != RESET)]
+    heading = ["", f"`{RESET}` [m]", *(f"`{label}`" for label in EVALUATED if label != RESET)]
     lines = ["| " + " | ".join(heading) + " |", "|" + " --- |" * len(heading)]
     for situation in SITUATIONS:
         found = errors(situation)

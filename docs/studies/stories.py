@@ -26,7 +26,7 @@ from train_scenarios import DEPARTURE, indicated, lowest_limit, mean_speed_error
 
 SCENARIOS = ("freight_sc1", "freight_sc2", "freight_sc3", "freight_sc4")
 OBSERVERS = ("multirate_cdo", "takagi_sugeno_cdo")
-CHOSEN_ON, JUDGED_ON = range(100, 110), range(20)  # seeds of the receiver
+CHOSEN_ON, EVALUATED_ON = range(100, 110), range(20)  # seeds of the receiver
 DRAWN = range(10)  # seeds of the rails
 THETAS = (0.5, 0.7, 1.0, 1.5, 2.0, 3.0)  # [1/s]
 FIX_GAINS = (4.55, 7.125, 4.55, 1.0)  # of the Takagi-Sugeno observer, poles -0.5, -0.8, -1.25, -2, for theta = 1
@@ -101,12 +101,12 @@ def study(name: str, variations: Sequence[Settings]) -> list[Numbers]:
     Raises:
         RuntimeError: a run failed.
     """
-    told: dict[int, Numbers] = {}
+    reported: dict[int, Numbers] = {}
     for run in Scenario.load(name).set("certificates", "ignore").vary(variations).each(WORKERS):
         if run.outcome is None or run.failure is not None:
             raise RuntimeError(f"{name}, {run.settings}: {run.failure}")
-        told[run.number] = story(run.outcome)
-    return [told[number] for number in sorted(told)]
+        reported[run.number] = story(run.outcome)
+    return [reported[number] for number in sorted(reported)]
 
 
 def table(stories: Mapping[str, Sequence[Numbers]]) -> str:
@@ -161,7 +161,7 @@ def main(chosen: Sequence[str]) -> None:
     if "theta" in chosen:
         print(f"Median over {len(CHOSEN_ON)} seeds of the mean speed error in Sc1 [km/h]\n\n{choice_table(choice())}\n")
     if "receiver" in chosen:
-        print(table({name: study(name, receivers(JUDGED_ON)) for name in SCENARIOS}), "\n")
+        print(table({name: study(name, receivers(EVALUATED_ON)) for name in SCENARIOS}), "\n")
     if "rails" in chosen:
         print(table({"freight_sc2": study("freight_sc2", rails(DRAWN))}), "\n")
 

@@ -75,8 +75,8 @@ def names_of(system: HybridSystem) -> str:
         system: any.
     """
     signals = (*system.states, *system.input_signals, *system.outputs, *system.parameter_signals)
-    told = [(s.scalar_names, s.unit, s.causality, s.variability, s.start_values, s.description) for s in signals]
-    return hashlib.sha256(repr((scalar_names(signals), told)).encode()).hexdigest()[:16]
+    reported = [(s.scalar_names, s.unit, s.causality, s.variability, s.start_values, s.description) for s in signals]
+    return hashlib.sha256(repr((scalar_names(signals), reported)).encode()).hexdigest()[:16]
 
 
 def runs() -> Iterator[tuple[str, str]]:

@@ -22,7 +22,7 @@ import numpy as np
 from cosim import Scenario
 from fmu_observer import OBSERVERS
 from fmu_observer.design.certified_gains import certified_gains
-from fmu_observer.observers.innovation_gate import GATE_MEMORY, VERDICT, GateMemory, ReportedPlace, judge
+from fmu_observer.observers.innovation_gate import GATE_MEMORY, VERDICT, GateMemory, ReportedPlace, evaluate
 from fmu_observer.observers.parameter_values import parameter_values
 from fmu_observer.observers.train import TrainObserver
 from plant_models.hybrid import Runtime, scalar_names
@@ -31,7 +31,7 @@ SCENARIO, RAILS, MODELS = "amsterdam_utrecht", ("dry", "wet"), ("true", "wrong")
 SPACINGS = {20.0: (0.5,), 100.0: (0.5,), 300.0: (0.5,), 1000.0: (0.2, 0.7), 2000.0: (0.2, 0.5, 0.8)}
 """Distance of the balises [m], and where in it the first one lies, a run each."""
 OFFSETS = np.geomspace(1.0, 1000.0, 61)  # [m]
-TOLD_OFFSETS = (3.0, 10.0, 30.0, 100.0, 300.0)  # [m], of the table
+STATED_OFFSETS = (3.0, 10.0, 30.0, 100.0, 300.0)  # [m], of the table
 STEP, BEGIN = 0.05, 3100.0  # [s], [m]
 PICTURE = Path(__file__).parents[1] / "images" / "telegram_gate.png"
 TRUE = {"mass": 900e3, "davis_a": 5400.0, "davis_b": 200.0, "davis_c": 12.0}
@@ -171,7 +171,7 @@ def beside(
                 runtime.u[inputs.index(signal)] = column[k]
         while following < len(stamps) and stamps[following] <= recording.t[k + 1]:
             runtime.advance(max(float(stamps[following]), float(t)))
-            found.append(_told(observer, runtime, float(places[following]), p, float(recording.odometer[k])))
+            found.append(_reported(observer, runtime, float(places[following]), p, float(recording.odometer[k])))
             runtime.u[inputs.index("balise_position")] = places[following]
             runtime.trigger("balise")
             following += 1
@@ -179,14 +179,16 @@ def beside(
     return found
 
 
-def _told(observer: TrainObserver, runtime: Runtime, place: float, p: Any, odometer: float) -> Telegram:
+def _reported(observer: TrainObserver, runtime: Runtime, place: float, p: Any, odometer: float) -> Telegram:
     names = scalar_names(observer.states)
     first = names.index(VERDICT)
     memory = GateMemory(*runtime.x[first : first + len(GATE_MEMORY)].tolist())
     estimate = float(runtime.x[names.index(observer.position_state)])
     offsets = np.concatenate([[0.0], OFFSETS, -OFFSETS])
     bound = float(observer.own_bound(observer.unpack_states(runtime.x), p))
-    used = np.asarray(judge(memory, ReportedPlace(place + offsets, 0.0, estimate, bound, odometer, runtime.t), p).used)
+    used = np.asarray(
+        evaluate(memory, ReportedPlace(place + offsets, 0.0, estimate, bound, odometer, runtime.t), p).used
+    )
     settled = memory.settled >= p.gate_recover
     return Telegram(estimate - place, settled, used[0] == 0.0, used[1:].reshape(2, -1).mean(axis=0))
 
@@ -223,12 +225,12 @@ def tables(results: Mapping[Any, list[Telegram]]) -> str:
     """Ignored true and used false telegrams as markdown, by observer and spacing [%]: least and most of both rails and
     both models.
     """
-    head = "| observer | spacing | telegrams | true ignored | " + " | ".join(f"+-{o:g} m" for o in TOLD_OFFSETS)
-    lines = [head + " |", "|" + "---|" * (4 + len(TOLD_OFFSETS))]
+    head = "| observer | spacing | telegrams | true ignored | " + " | ".join(f"+-{o:g} m" for o in STATED_OFFSETS)
+    lines = [head + " |", "|" + "---|" * (4 + len(STATED_OFFSETS))]
     for name, spacing in dict.fromkeys(key[2:] for key in results):
         each = [telegrams for key, telegrams in results.items() if key[2:] == (name, spacing)]
         count = sum(t.settled for telegrams in each for t in telegrams)
-        false = np.transpose([np.interp(TOLD_OFFSETS, OFFSETS, accepted_false(telegrams)) for telegrams in each])
+        false = np.transpose([np.interp(STATED_OFFSETS, OFFSETS, accepted_false(telegrams)) for telegrams in each])
         cells = " | ".join(_span(shares) for shares in ([ignored_true(t) for t in each], *false))
         lines.append(f"| `{name}` | {spacing:g} m | {count} | {cells} |")
     return "\n".join(lines)

@@ -26,7 +26,7 @@ PAGE = Path(__file__).parents[1] / "theses" / "telegram_gate.md"
 JOURNEYS = range(20)
 SPACINGS = {20.0: 4e3, 100.0: 8e3, 300.0: 15e3, 1000.0: 40e3, 2000.0: 40e3}
 """Mean distance of the balises [m], and the way on which they lie [m]; each distance is 0.7 to 1.3 times that."""
-TOLD_OFFSETS = (3.0, 10.0, 30.0, 100.0, 300.0)  # [m], of the table
+STATED_OFFSETS = (3.0, 10.0, 30.0, 100.0, 300.0)  # [m], of the table
 STEP, STOP = 0.1, 900.0  # [s]
 STUDIED: Mapping[str, str | None] = {
     "odometer_reset": None,
@@ -180,16 +180,16 @@ def study(observers: Sequence[str], seeds: Sequence[int] = JOURNEYS) -> dict[Any
 
 def table(results: Mapping[Any, list[Telegram]]) -> str:
     """Ignored true and used false telegrams as markdown [%]: with the true model, with a wrong one."""
-    head = "| observer | spacing | telegrams | true ignored | " + " | ".join(f"+-{o:g} m" for o in TOLD_OFFSETS)
-    lines = [head + " |", "|" + "---|" * (4 + len(TOLD_OFFSETS))]
+    head = "| observer | spacing | telegrams | true ignored | " + " | ".join(f"+-{o:g} m" for o in STATED_OFFSETS)
+    lines = [head + " |", "|" + "---|" * (4 + len(STATED_OFFSETS))]
     for name, spacing in dict.fromkeys(key[:2] for key in results):
         both = [results[name, spacing, model] for model in ("true", "wrong")]
         count = sum(t.settled for telegrams in both for t in telegrams)
         lost = any(not abs(t.innovation) < LOST for telegrams in both for t in telegrams)
-        false = np.transpose([np.interp(TOLD_OFFSETS, OFFSETS, accepted_false(telegrams)) for telegrams in both])
+        false = np.transpose([np.interp(STATED_OFFSETS, OFFSETS, accepted_false(telegrams)) for telegrams in both])
         cells = [_pair(shares) for shares in ([ignored_true(t) for t in both], *false)]
-        told = ["diverges"] * len(cells) if lost else cells
-        lines.append(f"| `{name}` | {spacing:g} m | {count} | {' | '.join(told)} |")
+        reported = ["diverges"] * len(cells) if lost else cells
+        lines.append(f"| `{name}` | {spacing:g} m | {count} | {' | '.join(reported)} |")
     return "\n".join(lines)
 
 

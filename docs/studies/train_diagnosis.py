@@ -239,8 +239,8 @@ def scored(out: Mapping[str, np.ndarray], fault: str, t: np.ndarray, onsets: np.
             first = int(np.flatnonzero(isolated.any(axis=0))[0])
             right += bool(isolated[own, first])
             wrong += not isolated[own, first]
-            told = own_code[own_code >= WHEEL]
-            last.append(float(told[-1]) if told.size else 0.0)
+            reported = own_code[own_code >= WHEEL]
+            last.append(float(reported[-1]) if reported.size else 0.0)
     return Score(len(onsets), detected, right, wrong, several, np.array(delays), np.array(last))
 
 
@@ -249,8 +249,8 @@ def score_row(title: str, s: Score, note: str = "") -> str:
     low, high = proportion_interval(s.detected, s.faults)
     delays = f"{np.median(s.delays):.1f} | {np.quantile(s.delays, 0.95):.1f}" if s.delays.size else "- | -"
     share = f"{100 * s.detected / s.faults:.0f} ({100 * low:.0f} to {100 * high:.0f})"
-    told = " | ".join(f"{100 * count / s.faults:.0f}" for count in (s.right, s.wrong, s.several))
-    return f"| {title} | {s.faults} | {share} | {delays} | {told} | {note} |"
+    reported = " | ".join(f"{100 * count / s.faults:.0f}" for count in (s.right, s.wrong, s.several))
+    return f"| {title} | {s.faults} | {share} | {delays} | {reported} | {note} |"
 
 
 def case_scores(
@@ -303,8 +303,8 @@ def turned_table(found: list[Score], turned: list[Score]) -> str:
     for (case, one), other, two in zip(signed, TURNED, turned, strict=True):
         cells = [[f"{100 * s.detected / s.faults:.0f}" for s in (one, two)]]
         cells += [[_delays(s) for s in (one, two)]]
-        told = ("right", "wrong", "several")
-        cells += [[f"{100 * getattr(s, name) / s.faults:.0f}" for s in (one, two)] for name in told]
+        reported = ("right", "wrong", "several")
+        cells += [[f"{100 * getattr(s, name) / s.faults:.0f}" for s in (one, two)] for name in reported]
         e = other.error
         how = f"{e.gain:g} of it" if e.gain != 1.0 else f"{e.offset:g} m" if e.offset else f"{e.drift:g} m/s"
         lines.append(f"| {case.title} | {how} | " + " | ".join(" | ".join(c) for c in cells) + " |")

@@ -66,7 +66,7 @@ SIZES = (
 NAMES = ["fault", "several_faults", *(f"{fault}_fault" for fault in FAULTS)]
 
 
-def told(
+def reported(
     run: dict[str, np.ndarray],
     faults: Faults,
     settings: Mapping[str, float],
@@ -105,7 +105,7 @@ def counted(
     onsets = [_brake(run) if brakes else len(run["time"]) // 3 for run in runs]
     faults = signed[0]
     outs = [
-        told(run, way, settings, seed + 100 * i, first, colour)
+        reported(run, way, settings, seed + 100 * i, first, colour)
         for way in signed
         for i, (run, first) in enumerate(zip(runs, onsets, strict=True))
     ]

@@ -193,8 +193,8 @@ def diagnosed(
     for number, (place, stamp) in enumerate(zip(places, stamps, strict=True)):
         batch.notify("balise", everyone, np.full(members, stamp), position=place + error[:, number])
     batch.start()
-    same = {"effort": run["effort"], "brake_demand": run["demand"], "gradient_force": run["gradient"]}
-    out = batch.run(t[1:], results=names, inputs={**same, **read})
+    equal = {"effort": run["effort"], "brake_demand": run["demand"], "gradient_force": run["gradient"]}
+    out = batch.run(t[1:], results=names, inputs={**equal, **read})
     if batch.failures:
         raise RuntimeError(str(batch.failures))
     return {name: out[:, :, i] for i, name in enumerate(names)}

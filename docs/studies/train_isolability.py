@@ -92,7 +92,7 @@ def comparison_table() -> str:
             allowed = theirs[fault]
             if said == () and allowed is not None and not set(allowed) - {"wheel_1", "wheel_2"}:
                 continue  # isolated, and rightly
-            lines.append(f"| {title} | {_words(fault)} | {_told(said)} | {_told(allowed)} |")
+            lines.append(f"| {title} | {_words(fault)} | {_reported(said)} | {_reported(allowed)} |")
     return "\n".join(lines)
 
 
@@ -100,7 +100,7 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _told(others: tuple[str, ...] | None) -> str:
+def _reported(others: tuple[str, ...] | None) -> str:
     if others is None:
         return "not detected"
     return "isolated" if not others else "one of it, " + ", ".join(_words(o) for o in others)

@@ -22,7 +22,7 @@ from cosim.studies.groups import mean_of
 from cosim.studies.measures import error_measures
 
 PAGE = Path(__file__).parents[1] / "theses" / "tuning_the_train.md"
-JUDGES = range(10, 16)  # searches saw 0 and 1
+EVALUATES = range(10, 16)  # searches saw 0 and 1
 QUICK = 60.0  # end of a quick run [s]
 
 EKF, THETA, JAMS = "balise_odometer_ekf", "adaptive_gain_cdo", "quasi_lpv_uio"
@@ -102,8 +102,8 @@ def drawn_faults() -> Scenario:
         return Scenario.load(file)
 
 
-def judged(
-    chosen: Sequence[Tuned], seeds: Sequence[int] = JUDGES, stop: float | None = None
+def validated(
+    chosen: Sequence[Tuned], seeds: Sequence[int] = EVALUATES, stop: float | None = None
 ) -> dict[str, list[dict[str, float]]]:
     """Measures of observers with each seed, by observer; names are without that of the observer.
 
@@ -151,15 +151,15 @@ def row(tuned: Tuned, before: Sequence[Mapping[str, float]], after: Sequence[Map
     return cells
 
 
-def table(seeds: Sequence[int] = JUDGES, stop: float | None = None) -> str:
+def table(seeds: Sequence[int] = EVALUATES, stop: float | None = None) -> str:
     """The table of the page, in markdown.
 
     Args:
-        seeds: of the faults. stop: see `judged`.
+        seeds: of the faults. stop: see `validated`.
     """
     head = ["", "rms of position [m]", "better by [m]", "largest at a gap's end [m]", "rms of speed [m/s]"]
     head += ["missed faults, false alarms", "NIS", "NEES position", "NEES speed"]
-    found = [judged(chosen, seeds, stop) for chosen in ROUNDS]
+    found = [validated(chosen, seeds, stop) for chosen in ROUNDS]
     lines = [head, ["---"] * len(head)]
     for first in ROUNDS[0]:
         for chosen, measured in zip(ROUNDS, found, strict=True):
@@ -174,11 +174,11 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="put the table into the page")
     parser.add_argument("--quick", action="store_true", help="one seed and the first minute; is never written")
     options = parser.parse_args()
-    made = table(JUDGES[:1], QUICK) if options.quick else table()
+    made = table(EVALUATES[:1], QUICK) if options.quick else table()
     if not options.write or options.quick:
         print(made)
         return
-    write_table(PAGE, "judged", made)
+    write_table(PAGE, "validated", made)
 
 
 if __name__ == "__main__":

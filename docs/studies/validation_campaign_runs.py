@@ -61,7 +61,7 @@ class Run:
     def detections(self) -> list[tuple[float, float]]:
         """Times for which the odometer was told to lie."""
         found = intervals(self.result.time, self.result[f"{OBSERVER}.odometer_fault"])
-        return [told for told in found if told[1] > self.start]
+        return [reported for reported in found if reported[1] > self.start]
 
     def lost(self, begin: float, end: float) -> float:
         """Way that the wheel lost, of jams of any length: the rim counts what no row shows."""

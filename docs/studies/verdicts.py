@@ -53,7 +53,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Judge:
+class Evaluator:
     """The unchanged result and its baselines, read back from their files: one for each of `RELATIVE`, and a thinned
     one.
     """
@@ -73,7 +73,7 @@ class Judge:
             result = repetition.make()
             yield self._row(f"{k + 1}", repetition.what, result)
             thinned = check(result, self.thinned)
-            yield Row(f"{k + 1}, thinned", repetition.what, (not thinned.equal,) * len(RELATIVE), *_told(thinned))
+            yield Row(f"{k + 1}, thinned", repetition.what, (not thinned.equal,) * len(RELATIVE), *_reported(thinned))
 
     def not_nested(self) -> Row:
         """A run and a thinned baseline of which neither has all points of the other."""
@@ -82,21 +82,21 @@ class Judge:
             baseline = _kept(self.reference, Path(folder) / "rows.json", DEFAULT, every)
         found = check(Conditions(step=step).run(), baseline)
         what = f"step {1000.0 * step:g} ms against a baseline with a row every {1000.0 * every:g} ms"
-        return Row("not nested", what, (not found.equal,) * len(RELATIVE), *_told(found))
+        return Row("not nested", what, (not found.equal,) * len(RELATIVE), *_reported(found))
 
     def _row(self, group: str, change: str, result: Result, why: str = "", harmless: bool = False) -> Row:
         found = [check(result, baseline) for baseline in self.baselines]
         caught = tuple(not comparison.equal for comparison in found)
-        return Row(group, change, caught, *_told(found[RELATIVE.index(DEFAULT)]), why, harmless)
+        return Row(group, change, caught, *_reported(found[RELATIVE.index(DEFAULT)]), why, harmless)
 
 
 @contextmanager
-def judge() -> Iterator[Judge]:
+def evaluate() -> Iterator[Evaluator]:
     """The run, its baselines written to files and read again."""
     reference = Conditions().run()
     with TemporaryDirectory() as folder:
         baselines = [_kept(reference, Path(folder) / f"{k}.json", relative) for k, relative in enumerate(RELATIVE)]
-        yield Judge(reference, baselines, _kept(reference, Path(folder) / "thinned.json", DEFAULT, THINNED))
+        yield Evaluator(reference, baselines, _kept(reference, Path(folder) / "thinned.json", DEFAULT, THINNED))
 
 
 def largest(comparison: Comparison) -> tuple[float, str]:
@@ -116,7 +116,7 @@ def _kept(reference: Result, path: Path, relative: float, every: float | None = 
     return read_baseline(path)
 
 
-def _told(comparison: Comparison) -> tuple[str, str, str]:
+def _reported(comparison: Comparison) -> tuple[str, str, str]:
     """What is worst, how large it is, and what else."""
     failed, telegrams = comparison.failed, comparison.events.differences
     if failed:

@@ -18,7 +18,7 @@ from fmu_observer.formulas.diagnosis.thresholds import alarm_rate, proportion_in
 PAGE = Path(__file__).resolve().parents[1] / "theses" / "wind_turbine.md"
 STOP = 4400.0  # [s]
 MADE_OF = range(100, 110)
-JUDGES = range(10)
+EVALUATES = range(10)
 PUBLISHED = {
     1: ("0 / 3 Ts", "10 Ts"),
     2: ("0 / 2 Ts", "10 Ts"),
@@ -101,15 +101,15 @@ def fault_row(number: int, outcome: Outcome, members: slice, where: str = "") ->
 
 def faults_table() -> str:
     """Detection and clearing of each fault: the ten of the benchmark, two of them in strong wind as well."""
-    count = len(JUDGES)
+    count = len(EVALUATES)
     head = ["", "fault", "published", "limit", "seen", "onset, median (largest)", "gone, median (largest)", "coverage"]
     rows = [[*head, "other alarms"]]
     for number in PUBLISHED:
         print(f"fault {number} of {len(PUBLISHED)}", file=sys.stderr, flush=True)
         after = 400.0 if number == 10 else 100.0  # [s] for the alarm to clear
-        outcome = run_members([number] * count, [*JUDGES], INTERVALS[number][1] + after)
+        outcome = run_members([number] * count, [*EVALUATES], INTERVALS[number][1] + after)
         rows.append(fault_row(number, outcome, slice(None)))
-    strong = run_members([8] * count + [9] * count, [*JUDGES] * 2, 1000.0, (500.0, 600.0), **STRONG)
+    strong = run_members([8] * count + [9] * count, [*EVALUATES] * 2, 1000.0, (500.0, 600.0), **STRONG)
     rows += [fault_row(8, strong, slice(0, count), ", 14 m/s"), fault_row(9, strong, slice(count, None), ", 14 m/s")]
     return markdown(rows)
 
@@ -117,7 +117,7 @@ def faults_table() -> str:
 def limits_table() -> str:
     """Limits, what they were made of, and false alarms where they were not made."""
     made = run_members([0] * len(MADE_OF), [*MADE_OF], STOP)
-    judged = run_members([0] * len(JUDGES), [*JUDGES], STOP)
+    evaluated = run_members([0] * len(EVALUATES), [*EVALUATES], STOP)
     sine = run_members([0] * 2, [20, 21], STOP, mean_to=9.0, sine_amplitude=4.0, turbulence_std=0.0)
     strong = run_members([0] * 8, [*range(30, 38)], 1100.0, **STRONG)
     limits = {
@@ -126,11 +126,11 @@ def limits_table() -> str:
     rows = [["residual", "limit", "largest in the 10 runs it was made of", "in 10 others", "sine", "14 m/s"]]
     for i, (name, _) in enumerate(PEAKS):
         limit, unit = limits[name]
-        peaks = [f"{outcome.peaks[:, i].max():.3g}" for outcome in (made, judged, sine, strong)]
+        peaks = [f"{outcome.peaks[:, i].max():.3g}" for outcome in (made, evaluated, sine, strong)]
         rows.append([name.replace("_", " "), f"{limit:g} {unit}".removesuffix(" 1"), *peaks])
     false = []
     for text, outcome, hours in (
-        ("ten other seeds, 4400 s each", judged, len(JUDGES) * STOP / 3600.0),
+        ("ten other seeds, 4400 s each", evaluated, len(EVALUATES) * STOP / 3600.0),
         ("wind 9 + 4 sin(0.01 t) m/s, two seeds of 4400 s", sine, 2 * STOP / 3600.0),
         ("14 m/s with turbulence, eight seeds of 1100 s", strong, 8 * 1100.0 / 3600.0),
     ):
@@ -174,9 +174,9 @@ def speeds_table() -> str:
         for i, size in enumerate(SHARES):
             part = slice(i * len(signs) * len(seeds), (i + 1) * len(signs) * len(seeds))
             seen = f"{np.count_nonzero(~np.isnan(outcome.onset[part]))} of {len(seeds) * len(signs)}"
-            told = f"{np.count_nonzero(right[part])} / {np.count_nonzero(named[part] & ~right[part])}"
+            reported = f"{np.count_nonzero(right[part])} / {np.count_nonzero(named[part] & ~right[part])}"
             time, cover = time_text(outcome.onset[part]), f"{np.mean(outcome.coverage[part]):.3f}"
-            rows.append([text, f"{100.0 * size:g}", seen, time, cover, told])
+            rows.append([text, f"{100.0 * size:g}", seen, time, cover, reported])
     return markdown(rows)
 
 

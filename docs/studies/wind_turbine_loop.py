@@ -141,7 +141,7 @@ class WindTurbineLoop(HybridSystem):
         new |= _whole("turbine", PARTS["turbine"].jump("sampling", t, turbine, inputs, FIXED["turbine"]))
         readings = self._readings(t, x._replace(**new), p)
         before, controller = _part("diagnosis", x), _part("controller", x)
-        given = _inputs(
+        stated = _inputs(
             DIAGNOSIS,
             wind_speed=readings["wind"],
             rotor_speed=vector(*readings["rotor"]),
@@ -151,7 +151,7 @@ class WindTurbineLoop(HybridSystem):
             torque_reference=controller.held_torque,
             pitch_reference=controller.held_pitch,
         )
-        diagnosed = DIAGNOSIS.jump("sampling", t, before, given, p)
+        diagnosed = DIAGNOSIS.jump("sampling", t, before, stated, p)
         asked = _inputs(
             PARTS["controller"], generator_speed=readings["generator"][0], generator_power=readings["power"]
         )
@@ -221,7 +221,7 @@ class WindTurbineLoop(HybridSystem):
         """
         acts = self._acts(t, p)
         own = 0.0 * t
-        raised_before, raised = _told(was), _told(now)
+        raised_before, raised = _reported(was), _reported(now)
         mine = [np.where(np.abs(p.own - i) < 0.5, np.where(p.fault > 0.0, 1.0, 0.0), 0.0) for i in range(_ALARMS)]
         for i in range(_ALARMS):
             own = np.maximum(own, np.maximum(mine[i], mine[NOT_ISOLATED]) * raised[i])
@@ -240,7 +240,7 @@ class WindTurbineLoop(HybridSystem):
         }
 
 
-def _told(m: Any) -> list[Array]:
+def _reported(m: Any) -> list[Array]:
     """The alarms, and behind them whether a fault is detected that is not isolated."""
     return [*(m.raised[i] for i in range(NOT_ISOLATED)), m.undecided_alarm[0]]
 
@@ -310,8 +310,8 @@ def run_members(
     batch = fmus.Batch(LOOP, len(faults))
     begins, ends = np.array([interval or INTERVALS.get(f, (0.0, 0.0)) for f in faults]).T
     own = [OWN_ALARM.get(f, 0) for f in faults]
-    given = {"fault": faults, "seed": seeds, "onset": begins, "end": ends, "own": own, **values}
-    for name, value in given.items():
+    stated = {"fault": faults, "seed": seeds, "onset": begins, "end": ends, "own": own, **values}
+    for name, value in stated.items():
         batch.set(name, value)
     batch.start()
     instants = np.unique([*np.arange(0.0, stop, 10.0), stop])

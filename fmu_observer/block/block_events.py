@@ -55,7 +55,7 @@ class Events:
         self._start = [float(protocol.policy_number(system.late_policy)), protocol.replay_horizon]
         self.payloads = _payload_positions(system)
         self._names = tuple(self.payloads)
-        self._runtime, self._given = runtime, _given_positions(system, runtime)
+        self._runtime, self._stated = runtime, _stated_positions(system, runtime)
         self.protocol = list(self._start)
         self.stamps = [STAMP_NOW] * len(self._names)
         self.listener: Callable[[str], None] | None = None
@@ -160,17 +160,17 @@ class Events:
         runtime = self._runtime
         if event.stamp >= runtime.t - TIME_TOLERANCE:
             advance(runtime, self.journal, event.stamp)
-            self.counters.judged(jump(runtime, self.journal, event))
+            self.counters.evaluated(jump(runtime, self.journal, event))
         elif self.late_policy == "late":
-            self.counters.late += self.counters.judged(jump(runtime, None, event))
+            self.counters.late += self.counters.evaluated(jump(runtime, None, event))
         else:
             reason, verdict = "late_policy is reject", 0
             if self.journal is not None:
-                reason, verdict = replay(runtime, self.journal, event, self._given, TIME_TOLERANCE)
+                reason, verdict = replay(runtime, self.journal, event, self._stated, TIME_TOLERANCE)
             if reason:
                 self._reject(event, reason)
                 return
-            self.counters.replayed += self.counters.judged(verdict)
+            self.counters.replayed += self.counters.evaluated(verdict)
 
     def _reject(self, event: Stamped, reason: str) -> None:
         self.counters.rejected += 1
@@ -186,7 +186,7 @@ def _payload_positions(system: HybridSystem) -> dict[str, tuple[int, ...]]:
     return {name: tuple(range(a, b)) for name, (a, b) in zip(names, pairwise(starts), strict=True)}
 
 
-def _given_positions(system: HybridSystem, runtime: Runtime) -> np.ndarray:
+def _stated_positions(system: HybridSystem, runtime: Runtime) -> np.ndarray:
     """Where in the runtime's memory stands what is set from outside: inputs and payloads (not the noises), and
     parameters.
     """

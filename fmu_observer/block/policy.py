@@ -38,7 +38,7 @@ class Counters:
     doubted: int = 0
     ignored: int = 0
 
-    def judged(self, verdict: int) -> bool:
+    def evaluated(self, verdict: int) -> bool:
         """Count an event by what the model made of it; whether it took effect.
 
         Args:
@@ -93,7 +93,7 @@ def communicate(runtime: Runtime, journal: BlockJournal | None) -> None:
 
 
 def replay(
-    runtime: Runtime, journal: BlockJournal, event: Stamped, given: np.ndarray, tolerance: float
+    runtime: Runtime, journal: BlockJournal, event: Stamped, stated: np.ndarray, tolerance: float
 ) -> tuple[str, int]:
     """Live the past again with `event` at its stamp: what comes out is what would be, had it come in time.
 
@@ -101,7 +101,7 @@ def replay(
         runtime: at the present; what it was given is kept.
         journal: rewritten so that the event is part of it.
         event: with a stamp in the past.
-        given: positions in the runtime's `memory` of what is set from outside: inputs, payloads and parameters.
+        stated: positions in the runtime's `memory` of what is set from outside: inputs, payloads and parameters.
         tolerance: how far the stamp may lie before the first record [s].
 
     Returns:
@@ -112,14 +112,14 @@ def replay(
     if reason:
         return reason, IGNORED
     past = journal.cut(event.stamp)
-    present = runtime.memory[given]
+    present = runtime.memory[stated]
     runtime.restore(Snapshot(past[0].memory, past[0].t, runtime.t0, past[0].ticks))
     if past[0].until > past[0].t:
         advance(runtime, journal, event.stamp)
     verdict = jump(runtime, journal, event)
     again: list[Record] = []
     for record in past:
-        runtime.memory[given] = record.memory[given]
+        runtime.memory[stated] = record.memory[stated]
         moves = record.until > record.t
         if moves and record.until <= runtime.t:
             continue
@@ -132,5 +132,5 @@ def replay(
         else:
             runtime.communicate()
     journal.extend(runtime.t, again)
-    runtime.memory[given] = present
+    runtime.memory[stated] = present
     return "", verdict

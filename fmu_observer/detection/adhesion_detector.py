@@ -78,7 +78,7 @@ class AdhesionDetector(HybridSystem):
     internal_step = 1e-2
     states = (
         state("filtered_slip", "1", 0.0, "Magnitude of the slip relative to the train speed, filtered"),
-        memory("judged_condition", "1", NOMINAL, "Verdict in force"),
+        memory("condition_in_force", "1", NOMINAL, "Verdict in force"),
         memory("contrary_time", "s", 0.0, "Time for which the other verdict has been reached without a break"),
     )
     inputs = (
@@ -117,21 +117,21 @@ class AdhesionDetector(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """A check: a contrary verdict that has stood long enough comes into force."""
-        verdict = np.where(np.abs(u.speed) > p.min_speed, self._verdict(x, u, p), x.judged_condition)
-        time = np.where(verdict != x.judged_condition, x.contrary_time + p.check_period, 0.0)
+        verdict = np.where(np.abs(u.speed) > p.min_speed, self._verdict(x, u, p), x.condition_in_force)
+        time = np.where(verdict != x.condition_in_force, x.contrary_time + p.check_period, 0.0)
         changes = time - p.check_period >= p.debounce_time - 1e-9  # at its first check a verdict has stood for no time
-        changed = np.where(time > 0.0, np.where(changes, verdict, x.judged_condition), x.judged_condition)
-        return {"judged_condition": changed, "contrary_time": np.where(changed != x.judged_condition, 0.0, time)}
+        changed = np.where(time > 0.0, np.where(changes, verdict, x.condition_in_force), x.condition_in_force)
+        return {"condition_in_force": changed, "contrary_time": np.where(changed != x.condition_in_force, 0.0, time)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         nominal, degraded = self._at_speed(u, p, p.nominal_slip_map, p.degraded_slip_map)
         high, low = self._at_speed(u, p, p.nominal_peak_map, p.degraded_peak_map)
         return {
-            "condition": x.judged_condition,
+            "condition": x.condition_in_force,
             "raw_condition": self._verdict(x, u, p),
             "nominal_optimum": nominal,
             "degraded_optimum": degraded,
-            "adhesion_limit": np.where(x.judged_condition == DEGRADED, low, high),
+            "adhesion_limit": np.where(x.condition_in_force == DEGRADED, low, high),
         }
 
     def _verdict(self, x: Any, u: Any, p: Any) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from fmu_observer.detection.jam_rules import (
     ROUNDING,
     SHARED_PARAMETERS,
-    Judgement,
+    JamVerdict,
     Reading,
     RepairedRules,
     Rules,
@@ -65,7 +65,7 @@ class _PrintedRules(Rules):
         ),
     )
 
-    def at_sample(self, m: Any, reading: Reading, p: Any) -> Judgement:
+    def at_sample(self, m: Any, reading: Reading, p: Any) -> JamVerdict:
         """Judge an odometer sample; it takes effect at the next one, or at once."""
         fault, recovering = m.next_fault_state, m.next_recovering_state  # in force from this sample on
         y, last = reading.odometer, m.last_odometer
@@ -89,7 +89,7 @@ class _PrintedRules(Rules):
             "last_odometer": y,
             "samples": m.samples + 1.0,
         }
-        return Judgement(after)
+        return JamVerdict(after)
 
     def fault(self, m: Any) -> Array:
         """1 while F is in force."""

@@ -63,7 +63,7 @@ class Passing(NamedTuple):
     known: Array
 
 
-class Judgement(NamedTuple):
+class JamVerdict(NamedTuple):
     """What follows from a sample or a balise.
 
     Args:
@@ -92,20 +92,20 @@ class Rules(Protocol):
     memory: tuple[Signal, ...]
     parameters: tuple[Signal, ...]
 
-    def at_sample(self, m: Any, reading: Reading, p: Any) -> Judgement:
+    def at_sample(self, m: Any, reading: Reading, p: Any) -> JamVerdict:
         """Judge an odometer sample.
 
         Args:
             m: named tuple with the `memory`. reading: the sample.
         """
 
-    def at_balise(self, m: Any, passing: Passing, p: Any) -> Judgement:
+    def at_balise(self, m: Any, passing: Passing, p: Any) -> JamVerdict:
         """Judge the way between two balises; nothing follows where the rules know no balises.
 
         Args:
             m: named tuple with the `memory`. passing: the way.
         """
-        return Judgement({})
+        return JamVerdict({})
 
     def fault(self, m: Any) -> Array:
         """1 while the odometer is judged to lie or is not confirmed.
@@ -216,7 +216,7 @@ class RepairedRules(Rules):
         parameter("way_time", "s", 1.0, "Shortest time between balises for the odometer's way to be judged", min=1e-3),
     )
 
-    def at_sample(self, m: Any, reading: Reading, p: Any) -> Judgement:
+    def at_sample(self, m: Any, reading: Reading, p: Any) -> JamVerdict:
         """Judge an odometer sample; it takes effect at once."""
         now = _compared(m, reading, p)
         settled, faults, armed, onset = _followed(m, reading, now, p)
@@ -244,9 +244,9 @@ class RepairedRules(Rules):
             "proven_time": np.where(trusted > 0.0, p.trust_time, rolled),
         }
         restart = np.maximum(np.maximum(believed, expired), jumped)
-        return Judgement(after, restart, onset, withdrawn=withdrawn)
+        return JamVerdict(after, restart, onset, withdrawn=withdrawn)
 
-    def at_balise(self, m: Any, passing: Passing, p: Any) -> Judgement:
+    def at_balise(self, m: Any, passing: Passing, p: Any) -> JamVerdict:
         """Judge the way between two balises, where nothing changed on it."""
         long_enough = indicator(passing.duration >= p.way_time)
         clean = passing.known * long_enough * indicator(m.unchanged_time >= passing.duration)
@@ -272,7 +272,7 @@ class RepairedRules(Rules):
             "refutations": row,
             "proven_time": np.where(confirmed > 0.0, p.trust_time, m.proven_time),
         }
-        return Judgement(after, confirmed * held, begun, shift)
+        return JamVerdict(after, confirmed * held, begun, shift)
 
     def fault(self, m: Any) -> Array:
         """1 while the odometer is judged to lie or is not confirmed."""

@@ -27,14 +27,14 @@ THRESHOLD_PARAMETERS = (
 
 THRESHOLD_MEMORY = (
     memory("filtered_residual", "m/s", 0.0, "Magnitude of the residual, filtered"),
-    memory("judged_fault", "1", 0.0, "1 while a fault is detected, FD"),
+    memory("detected_fault", "1", 0.0, "1 while a fault is detected, FD"),
     memory("armed", "1", 1.0, "1 when the next rise of the residual counts, the flag of the thesis"),
     memory("fault_time", "s", 0.0, "Time since the fault was detected"),
 )
 """What the detector remembers."""
 
 
-def judge(x: Any, residual: Array, sample_period: Array, p: Any) -> dict[str, Array]:
+def evaluate(x: Any, residual: Array, sample_period: Array, p: Any) -> dict[str, Array]:
     """One sample of the detector.
 
     1. ``r > eps1``, flag, no fault: a fault begins, the flag falls.
@@ -55,17 +55,17 @@ def judge(x: Any, residual: Array, sample_period: Array, p: Any) -> dict[str, Ar
     Source: Aguiar Cota 2019, (3.18) and 3.2.2.3.
     """
     level = _filtered(x, residual, sample_period, p)
-    time = np.where(x.judged_fault > 0.0, x.fault_time + sample_period, 0.0)
-    begins = np.where(level > p.threshold_start, x.armed * (1.0 - x.judged_fault), 0.0)
-    ends = np.where(level > p.threshold_end, x.armed * x.judged_fault, 0.0)
-    given_up = np.where(time >= p.longest_fault - ROUNDING, x.judged_fault, 0.0)
-    over = np.maximum(ends, given_up)
-    fault = np.where(begins > 0.0, 1.0, np.where(over > 0.0, 0.0, x.judged_fault))
+    time = np.where(x.detected_fault > 0.0, x.fault_time + sample_period, 0.0)
+    begins = np.where(level > p.threshold_start, x.armed * (1.0 - x.detected_fault), 0.0)
+    ends = np.where(level > p.threshold_end, x.armed * x.detected_fault, 0.0)
+    over_limit = np.where(time >= p.longest_fault - ROUNDING, x.detected_fault, 0.0)
+    over = np.maximum(ends, over_limit)
+    fault = np.where(begins > 0.0, 1.0, np.where(over > 0.0, 0.0, x.detected_fault))
     armed = np.where(level < p.threshold_quiet, 1.0, x.armed)
     armed = np.where(np.maximum(begins, over) > 0.0, 0.0, armed)
     return {
         "filtered_residual": level,
-        "judged_fault": fault,
+        "detected_fault": fault,
         "armed": armed,
         "fault_time": np.where(fault > 0.0, time, 0.0),
     }
@@ -99,8 +99,8 @@ class ThresholdDetector(HybridSystem):
     """Fault detector for a residual that shows only the begin and the end of a fault: Aguiar Cota 2019, (3.18).
 
     An observer with integrators absorbs a lasting fault: its residual peaks at the onset, falls, and peaks again, with
-    the other sign, when the fault ends. So the second rise is the end. `judge` has the rules. They need a residual that
-    is quiet without a fault: thresholds of 5 mm/s and 1 mm/s, as printed, are for quasi-continuous speed, not for
+    the other sign, when the fault ends. So the second rise is the end. `evaluate` has the rules. They need a residual
+    that is quiet without a fault: thresholds of 5 mm/s and 1 mm/s, as printed, are for quasi-continuous speed, not for
     an odometer that is held for 200 ms.
 
     The residual is judged every `sample_period`. The printed rules have no way out of a false alarm, nor of an end that
@@ -137,11 +137,11 @@ class ThresholdDetector(HybridSystem):
         return super().requirements(p) | threshold_requirements(p)
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        return judge(x, u.residual, p.sample_period, p)
+        return evaluate(x, u.residual, p.sample_period, p)
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         return {
-            "odometer_fault": x.judged_fault,
-            "recovering": x.judged_fault * x.armed,
+            "odometer_fault": x.detected_fault,
+            "recovering": x.detected_fault * x.armed,
             "residual_level": x.filtered_residual,
         }

@@ -91,8 +91,8 @@ def _share_of(
         Omar 2012, 7.7.7, (7.7.7)-(7.7.8), for the train as one point.
     """
     known = (window.speed[0], window.speed[-1], step, mass, p.davis_a, p.davis_b, p.davis_c)
-    looked_through = (p.least_share, p.most_share, p.smoothing)
-    (found,) = enclosed(_inverted, vector(previous), vector(*parts), vector(*rest), vector(*known, *looked_through))
+    settings = (p.least_share, p.most_share, p.smoothing)
+    (found,) = enclosed(_inverted, vector(previous), vector(*parts), vector(*rest), vector(*known, *settings))
     return Inverted(found[0], found[1])
 
 

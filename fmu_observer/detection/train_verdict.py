@@ -24,7 +24,7 @@ from fmu_observer.detection.train_isolation import (
 )
 from fmu_observer.detection.train_residuals import Readings, tolerance
 from fmu_observer.formulas.diagnosis.isolation_table import IsolationTable, IsolationVerdict, largest
-from fmu_observer.formulas.diagnosis.window_inversion import Alarm, judge
+from fmu_observer.formulas.diagnosis.window_inversion import Alarm, evaluate
 from plant_models.hybrid import Array, vector
 
 _GROUPS = (MOTION, BRAKE, TRACTION)
@@ -110,7 +110,7 @@ def alarms_after(x: Any, t: Array, ratios: Sequence[Array], p: Any) -> dict[str,
         slow = name.startswith(("odometer", "radar", "gps", "pressure"))
         exceeds = np.where(ratio > 1.0, 1.0, 0.0)
         counts = (p.raise_samples, p.clear_samples) if slow else (1.0, 1.0)
-        alarms.append(judge(Alarm(*before), t, exceeds, *counts))
+        alarms.append(evaluate(Alarm(*before), t, exceeds, *counts))
     after = zip(Alarm._fields, zip(*alarms, strict=True), strict=True)
     return {"ratio": vector(*ratios), **{name: vector(*values) for name, values in after}}
 
@@ -272,13 +272,15 @@ def _group_verdict(
     raised, available = x.raised[own], can.residuals[own]
     any_alarm = largest([a * b for a, b in zip(raised, available, strict=True)])
     start = np.where(any_alarm > 0.0, np.where(since < 0.0, t, since), -1.0)
-    judged = group.judge(raised, available, possible, can.apart)
+    evaluated = group.evaluate(raised, available, possible, can.apart)
     sure = np.where(t - start >= p.isolation_delay - 1e-9, 1.0, 0.0)
     fresh = largest([now * (1.0 - old) for now, old in zip(raised, before[own], strict=True)])
-    stays, several = _stays(group, x.code[faults], judged, raised, possible, fresh)
+    stays, several = _stays(group, x.code[faults], evaluated, raised, possible, fresh)
     kept = largest(stays)
     found = _GroupVerdict([], [], [], [], start, several)
-    for fault, isolated, suspected, stay in zip(group.faults, judged.isolated, judged.suspected, stays, strict=True):
+    for fault, isolated, suspected, stay in zip(
+        group.faults, evaluated.isolated, evaluated.suspected, stays, strict=True
+    ):
         certain = np.where(kept > 0.0, stay, isolated * sure)
         maybe = (1.0 - kept) * (suspected + isolated * (1.0 - sure))
         margin, seen = _margin(group, fault, x.ratio[own], available)
@@ -306,14 +308,14 @@ def _faulty_speeds(x: Any, codes: list[Array]) -> Array:
 
 
 def _stays(
-    group: IsolationTable, known: Array, judged: IsolationVerdict, alarms: Array, possible: list[Array], fresh: Array
+    group: IsolationTable, known: Array, evaluated: IsolationVerdict, alarms: Array, possible: list[Array], fresh: Array
 ) -> tuple[list[Array], Array]:
     """For each fault 1 where it was isolated and stays so: alarms only go, or others come beside its own, which it does
     not explain; and 1 where there are several: no single fault explains the alarms, or not the one that is isolated.
     """
     by_name = dict(zip(group.residuals, alarms, strict=True))
-    stays, several = [], judged.unexplained
-    for fault, code, cover, there in zip(group.faults, known, judged.covers, possible, strict=True):
+    stays, several = [], evaluated.unexplained
+    for fault, code, cover, there in zip(group.faults, known, evaluated.covers, possible, strict=True):
         on = np.where(code >= WHEEL, there, 0.0)
         beside = on * (1.0 - cover) * largest([by_name[residual] for residual in group.must[fault]])
         stays.append(np.maximum(on * cover * (1.0 - fresh), beside))

@@ -100,8 +100,8 @@ class WheelSignature(HybridSystem):
         memory("changes", "m/s", 0.0, "The last changes of the reading, the oldest first", size=CHANGES),
         memory("last_reading", "m/s", 0.0, "Reading before"),
         memory("readings", "1", 0.0, "Readings taken, counted as far as is needed"),
-        memory("told_kind", "1", 0.0, "-1 a jam, 1 a skid, 0 neither"),
-        memory("told_change", "1", 0.0, "Class of the newest record"),
+        memory("reported_kind", "1", 0.0, "-1 a jam, 1 a skid, 0 neither"),
+        memory("reported_change", "1", 0.0, "Class of the newest record"),
         memory("held_time", "s", 0.0, "Time since the fault was told"),
     )
     events = (ODOMETER_SAMPLE,)
@@ -118,11 +118,11 @@ class WheelSignature(HybridSystem):
         return super().requirements(p) | {trained: kept}
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        taken, kind = x.readings, x.told_kind
+        taken, kind = x.readings, x.reported_kind
         change = np.where(taken > 0.5, u.odometer - x.last_reading, 0.0)
         record = [*x.changes[1:], change]
         newest = np.where(taken > CHANGES - 0.5, _record_class(WHEEL_CLASSES, record), 0.0)
-        acts = np.where(newest == x.told_change, 0.0, newest)
+        acts = np.where(newest == x.reported_change, 0.0, newest)
         kept = np.where(acts * kind == 0.0, np.where(kind == 0.0, acts, kind), np.where(acts == kind, kind, 0.0))
         time = np.where(kept == 0.0, 0.0, np.where(kept == kind, x.held_time + p.odometer_period, 0.0))
         over = time > p.hold_limit
@@ -131,14 +131,14 @@ class WheelSignature(HybridSystem):
             "changes": vector(*record),
             "last_reading": u.odometer,
             "readings": np.minimum(taken + 1.0, 1.0 * CHANGES),
-            "told_kind": np.where(over, 0.0, kept),
-            "told_change": newest,
+            "reported_kind": np.where(over, 0.0, kept),
+            "reported_change": newest,
             "held_time": np.where(over, 0.0, time),
         }
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        newest = {"kind": x.told_kind, "change": x.told_change, "fault_time": x.held_time}
-        return {"odometer_fault": np.abs(x.told_kind)} | newest
+        newest = {"kind": x.reported_kind, "change": x.reported_change, "fault_time": x.held_time}
+        return {"odometer_fault": np.abs(x.reported_kind)} | newest
 
 
 def _record_class(classes: SignatureClassifier, record: Sequence[Array]) -> Array:

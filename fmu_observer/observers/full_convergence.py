@@ -205,8 +205,8 @@ def _effort_options(effort: Effort) -> dict[str, Any]:
     Args:
         effort: what a solution may cost.
     """
-    given: dict[str, Any] = {"tolerance": effort.tolerance, "max_iterations": effort.max_iterations}
-    return given if effort.deadline == inf else given | {"deadline": effort.deadline}
+    stated: dict[str, Any] = {"tolerance": effort.tolerance, "max_iterations": effort.max_iterations}
+    return stated if effort.deadline == inf else stated | {"deadline": effort.deadline}
 
 
 def _ended(x: Any) -> dict[str, Array]:

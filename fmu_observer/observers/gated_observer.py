@@ -14,7 +14,7 @@ from fmu_observer.observers.innovation_gate import (
     VERDICT,
     GateMemory,
     ReportedPlace,
-    judge,
+    evaluate,
 )
 from plant_models.hybrid import Array, Event, HybridSystem, TriggeredEvent, input_signal
 from plant_models.hybrid.missing import or_else
@@ -66,7 +66,7 @@ class GatedObserver(HybridSystem):
                 *self.parameters,
                 *(replace(s, start=self.gate_start) if s.name == "gate" else s for s in GATE_PARAMETERS),
             )
-            self.events = tuple(_judged(event) if _is_gated(event) else event for event in self.events)
+            self.events = tuple(_evaluated(event) if _is_gated(event) else event for event in self.events)
         super().__init__(**options)
 
     # -- what a subclass writes -------------------------------------------------------------------------------------
@@ -95,10 +95,10 @@ class GatedObserver(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """`update`, where the gate lets the telegram pass."""
-        judges = self.gated and event == GATED_EVENT
-        return self._judged_update(t, x, u, p) if judges else self.update(event, t, x, u, p)
+        evaluates = self.gated and event == GATED_EVENT
+        return self._evaluated_update(t, x, u, p) if evaluates else self.update(event, t, x, u, p)
 
-    def _judged_update(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+    def _evaluated_update(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         estimate = getattr(x, self.position_state)
         gate = GateMemory(*(getattr(x, s.name) for s in GATE_MEMORY))
         odometer = self.odometer_of(u)
@@ -107,11 +107,11 @@ class GatedObserver(HybridSystem):
         report = ReportedPlace(
             u.balise_position, u.balise_location_accuracy, estimate, self.own_bound(x, p), odometer, t
         )
-        judged, listens = judge(gate, report, p), self.listens(p)
-        used = np.where(listens > 0.0, judged.used, 1.0)
-        begun = np.where(listens * judged.restart > 0.0, u.balise_position, estimate)
-        after = self._weighed_update(t, x._replace(**{self.position_state: begun}), u, p, judged.weight)
-        remembered = zip(GATE_MEMORY, judged.memory, gate, strict=True)
+        evaluated, listens = evaluate(gate, report, p), self.listens(p)
+        used = np.where(listens > 0.0, evaluated.used, 1.0)
+        begun = np.where(listens * evaluated.restart > 0.0, u.balise_position, estimate)
+        after = self._weighed_update(t, x._replace(**{self.position_state: begun}), u, p, evaluated.weight)
+        remembered = zip(GATE_MEMORY, evaluated.memory, gate, strict=True)
         return {name: np.where(used > 0.0, value, getattr(x, name)) for name, value in after.items()} | {
             s.name: np.where(listens > 0.0, new, old) for s, new, old in remembered
         }
@@ -140,6 +140,6 @@ def _is_gated(event: Event) -> TypeGuard[TriggeredEvent]:
     )
 
 
-def _judged(event: TriggeredEvent) -> TriggeredEvent:
+def _evaluated(event: TriggeredEvent) -> TriggeredEvent:
     accuracy = () if _LOCATION_ACCURACY.name in (s.name for s in event.payload) else (_LOCATION_ACCURACY,)
     return replace(event, payload=(*event.payload, *accuracy), verdict=VERDICT)

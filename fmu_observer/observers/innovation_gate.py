@@ -131,7 +131,7 @@ class ReportedPlace(NamedTuple):
     t: Array
 
 
-class _GateJudgement(NamedTuple):
+class _GateVerdict(NamedTuple):
     """Args: used: 1 where the position is used, else 0. restart: 1 where the estimate restarts there. weight: of the
     innovation, 0 to 1. memory: afterwards.
     """
@@ -199,7 +199,7 @@ def _gate_limit(before: GateMemory, report: ReportedPlace, p: Any) -> Array:
     return p.gate_floor + known_accuracy(report.accuracy) + _granted_error(before, report, p)
 
 
-def judge(before: GateMemory, report: ReportedPlace, p: Any) -> _GateJudgement:
+def evaluate(before: GateMemory, report: ReportedPlace, p: Any) -> _GateVerdict:
     """Whether a reported position is used, how much it weighs, and what the gate remembers of it.
 
     Args:
@@ -233,7 +233,7 @@ def judge(before: GateMemory, report: ReportedPlace, p: Any) -> _GateJudgement:
     )
     kept = (np.where(used > 0.0, new, old) for new, old in zip(after[1:6], before[1:6], strict=True))
     still_doubted = np.where(used > 0.0, 0.0, after.doubted)
-    return _GateJudgement(used, restart, weight, GateMemory._make((after.verdict, *kept, still_doubted, *after[7:])))
+    return _GateVerdict(used, restart, weight, GateMemory._make((after.verdict, *kept, still_doubted, *after[7:])))
 
 
 def _row(before: GateMemory, report: ReportedPlace, p: Any) -> tuple[Array, ...]:

@@ -249,12 +249,12 @@ static Status step(Batch *batch, Member *member, double end) {
 EXPORT void batch_run(Batch *batch, int64_t first, int64_t last, const double *instants, int64_t count, const Columns *inputs, const Columns *results) {
     for (int64_t i = first; i < last; i++) {
         Member *member = &batch->members[i];
-        double *given = inputs->values + i * inputs->member_stride, *taken = results->values + i * results->member_stride;
+        double *fed = inputs->values + i * inputs->member_stride, *taken = results->values + i * results->member_stride;
         for (int64_t k = 0; k < count; k++) {
             if (member->failure == NULL && k > 0 && step(batch, member, instants[k]) != STATUS_OK)
                 fail(batch, member);
             if (member->failure == NULL && inputs->count > 0 &&
-                instance_set_reals(member->instance, "run", inputs->references, (size_t)inputs->count, given + k * inputs->instant_stride) != STATUS_OK)
+                instance_set_reals(member->instance, "run", inputs->references, (size_t)inputs->count, fed + k * inputs->instant_stride) != STATUS_OK)
                 fail(batch, member);
             get_or_nan(member, results->references, results->count, taken + k * results->instant_stride);
         }

@@ -184,9 +184,9 @@ class Batch:
             BatchError: time has not begun, the instants do not rise, a name is unknown, or a shape does not fit.
         """
         times = self._instants(instants)
-        given = self._inputs(inputs or {}, len(times))
+        stated = self._inputs(inputs or {}, len(times))
         taken = self._place(into, (self.members, len(times), len(results)))
-        sources = _Columns.of([self._scalar(name) for name in inputs or {}], given)
+        sources = _Columns.of([self._scalar(name) for name in inputs or {}], stated)
         targets = _Columns.of([self._scalar(name) for name in results], taken)
         for first in range(0, self.members, _MEMBERS_AT_A_TIME):
             last = min(first + _MEMBERS_AT_A_TIME, self.members)
@@ -234,12 +234,12 @@ class Batch:
 
     def _rows(self, name: str, values: ArrayLike, width: int) -> np.ndarray:
         """Values by member and element, shape (members, width)."""
-        given, vector = np.asarray(values, dtype=float), name in self._vectors
+        stated, vector = np.asarray(values, dtype=float), name in self._vectors
         shapes = [(width,), (self.members, width)] if vector else [(), (self.members,)]
-        if given.shape not in shapes:
+        if stated.shape not in shapes:
             expected = " or ".join(map(str, shapes))
-            raise BatchError(f"{self.system.name}: {name}: expected shape {expected}, got {given.shape}.")
-        rows = given if vector or given.ndim == 0 else given[:, np.newaxis]
+            raise BatchError(f"{self.system.name}: {name}: expected shape {expected}, got {stated.shape}.")
+        rows = stated if vector or stated.ndim == 0 else stated[:, np.newaxis]
         return np.ascontiguousarray(np.broadcast_to(rows, (self.members, width)))
 
     def _instants(self, instants: ArrayLike) -> np.ndarray:

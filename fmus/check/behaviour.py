@@ -60,8 +60,8 @@ def divided_steps(runner: Runner, scale: float = 1.0) -> str:
     change = np.abs(whole - start)
     moving = change > RESOLUTION * np.abs(whole)
     for parts, divided in zip(_DIVISIONS, all_divided, strict=True):
-        same = np.abs(divided - whole) <= STEP_TOLERANCE * change + RESOLUTION * np.abs(whole)
-        if not _enough(same, moving):
+        equal = np.abs(divided - whole) <= STEP_TOLERANCE * change + RESOLUTION * np.abs(whole)
+        if not _enough(equal, moving):
             shares = " and ".join(f"{part:g}" for part in parts)
             found = worst(runner, whole, divided)
             return f"the outputs differ: a step of {h:g} s and one in parts of {shares} of it end apart, {found}"

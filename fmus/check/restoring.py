@@ -80,7 +80,7 @@ def restoring(runner: Runner) -> Restoring:
             trips.append(_trip(runner, state, saved_at, path, FAR))
     finally:
         component.release(state)
-    return _judged(np.array(first), trips, solver_tolerance(runner), f"after a restored state {problem}")
+    return _evaluated(np.array(first), trips, solver_tolerance(runner), f"after a restored state {problem}")
 
 
 def _trip(runner: Runner, state: Any, saved_at: float, path: Sequence[float], distance: float = 1.0) -> _Trip:
@@ -100,7 +100,7 @@ def solver_tolerance(runner: Runner) -> float:
     return max(runner.component.tolerance or 0.0, USUAL_TOLERANCE)
 
 
-def _judged(first: np.ndarray, trips: Sequence[_Trip], tolerance: float, problem: str) -> Restoring:
+def _evaluated(first: np.ndarray, trips: Sequence[_Trip], tolerance: float, problem: str) -> Restoring:
     """Compare the rows after saving, shape (k, q), with those after each excursion; `tolerance` is the solver's,
     relative.
     """

@@ -20,7 +20,7 @@ MOVING = (None, "continuous", "discrete")
 END = 1e6
 """Stop time that is announced where the FMU has no default experiment, seconds after the start [s]."""
 
-_LOOKED_AT = 200
+_READ_AT_MOST = 200
 """Local variables that are read where there is no output."""
 
 
@@ -88,7 +88,7 @@ class Runner:
     @property
     def output_names(self) -> list[str]:
         """Names of the outputs, elements of arrays included; where there are none, of the first local variables."""
-        locals_ = self.component.names("local")[:_LOOKED_AT]
+        locals_ = self.component.names("local")[:_READ_AT_MOST]
         return self.component.names("output") or [
             n for n in locals_ if self.component.variables[n].variability in MOVING
         ]

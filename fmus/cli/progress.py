@@ -15,7 +15,7 @@ class ProgressBar:
     """
 
     def __init__(self, unit: str = "it", *, silent: bool = False, shape: str | None = None) -> None:
-        self._look = {"unit": unit, "bar_format": shape}
+        self._style = {"unit": unit, "bar_format": shape}
         self._hidden = silent or not sys.stderr.isatty()
         self._bar: Any = None
 
@@ -30,7 +30,7 @@ class ProgressBar:
         if self._bar is None:
             from tqdm import tqdm  # noqa: PLC0415 - only for those who watch
 
-            self._bar = tqdm(total=total, leave=False, file=sys.stderr, **self._look)
+            self._bar = tqdm(total=total, leave=False, file=sys.stderr, **self._style)
         self._bar.set_description_str(what)
         self._bar.update(done - self._bar.n)
 

@@ -125,8 +125,8 @@ class FMI1Slave(WholeStepSlave):
         try:
             return float(text) if variable.type == "Real" else int(text)
         except ValueError as error:
-            given = f"{self.name}.{variable.name} declares the start value {text!r}"
-            raise ValueError(f"{given}, which is no {variable.type}.") from error
+            stated = f"{self.name}.{variable.name} declares the start value {text!r}"
+            raise ValueError(f"{stated}, which is no {variable.type}.") from error
 
     def exact_reader(self, name: str) -> Callable[[], Values]:
         read = super().exact_reader(name)

@@ -92,8 +92,8 @@ class JoinedCalls:
     @property
     def hangs_in(self) -> bool:
         """Whether somebody logs calls, or stands in for the library."""
-        answering = [*map(self._slave._functions.__getitem__, self._names)]
-        return self._slave.fmiCallLogger is not None or answering != self._expected
+        responding = [*map(self._slave._functions.__getitem__, self._names)]
+        return self._slave.fmiCallLogger is not None or responding != self._expected
 
     def __call__(self) -> None:
         """Make the calls."""

@@ -174,10 +174,10 @@ def _list_reader(slave: Any, group: _Group, values: np.ndarray) -> Callable[[], 
     more = {"nValues": group.total} if group.has_arrays else {}
 
     def read() -> None:
-        given = get(references, **more)
-        if len(given) != total:
-            raise ValueError(f"get{kind} gave {len(given)} values, expected {total}")
-        values[index] = given
+        stated = get(references, **more)
+        if len(stated) != total:
+            raise ValueError(f"get{kind} gave {len(stated)} values, expected {total}")
+        values[index] = stated
 
     return read
 

@@ -29,10 +29,10 @@ def distinguish(description: ModelDescription) -> None:
     named: dict[str, list[ModelVariable]] = {}
     for variable in description.modelVariables:
         named.setdefault(variable.name, []).append(variable)
-    for name, same in named.items():
-        different = {(v.type, v.valueReference) for v in same}
-        if len(different) > 1 and all(v.causality in INTERNAL for v in same):
-            for variable in same:
+    for name, equal in named.items():
+        different = {(v.type, v.valueReference) for v in equal}
+        if len(different) > 1 and all(v.causality in INTERNAL for v in equal):
+            for variable in equal:
                 variable.name = f"{name}{SHARED}{variable.valueReference})"
 
 
@@ -46,8 +46,8 @@ def doubled_names(description: ModelDescription) -> str | None:
     if not shared:
         return None
     names = sorted({name.partition(SHARED)[0] for name in shared})
-    given = f"the names {', '.join(map(repr, names))} are" if len(names) > 1 else f"the name {names[0]!r} is"
-    return f"{given} given to more than one internal variable; they are called {', '.join(map(repr, shared))} here."
+    stated = f"the names {', '.join(map(repr, names))} are" if len(names) > 1 else f"the name {names[0]!r} is"
+    return f"{stated} given to more than one internal variable; they are called {', '.join(map(repr, shared))} here."
 
 
 def nonsense(description: ModelDescription) -> str | None:
@@ -87,8 +87,8 @@ def _faults(description: ModelDescription) -> Iterator[str]:
         if not 0 <= reference <= MAX_REFERENCE:
             yield f"variable '{variable.name}' has the value reference {reference}, expected 0 to {MAX_REFERENCE}."
         if variable.type == "Clock" and variable.causality == "input" and variable.intervalVariability not in CLOCKS:
-            given = variable.intervalVariability
-            yield f"clock '{variable.name}' has the intervalVariability {given!r}, expected one of {', '.join(CLOCKS)}."
+            found = variable.intervalVariability
+            yield f"clock '{variable.name}' has the intervalVariability {found!r}, expected one of {', '.join(CLOCKS)}."
         fault = shape_fault(variable)
         if fault is not None:
             yield fault

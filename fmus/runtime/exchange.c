@@ -138,10 +138,10 @@ static void happen(Instance *instance) {
     for (;;) {
         double due = runtime_next_due(runtime), stamp = events_first_stamp(runtime), now = runtime->clock.t;
         bool is_due = due <= now + runtime_tolerance(runtime, now);
-        bool is_told = stamp <= now + TIME_TOLERANCE;
-        if (is_due && !(is_told && stamp < due - TIME_TOLERANCE))
+        bool is_notified = stamp <= now + TIME_TOLERANCE;
+        if (is_due && !(is_notified && stamp < due - TIME_TOLERANCE))
             runtime_fire_due(runtime);
-        else if (is_told)
+        else if (is_notified)
             events_apply_here(instance);
         else
             return;

@@ -20,7 +20,7 @@ static size_t tunable_count(void) {
     return count;
 }
 
-static size_t given_length(void) {
+static size_t stated_length(void) {
     return (size_t)model.own_inputs + tunable_count();
 }
 
@@ -47,7 +47,7 @@ static size_t block_length(size_t record) {
 PRIVATE size_t journal_length(void) {
     if (model.triggered_count == 0)
         return 0;
-    return 2 * RING_BLOCKS * block_length(3 + given_length() + payload_length()) + given_length() + tunable_count();
+    return 2 * RING_BLOCKS * block_length(3 + stated_length() + payload_length()) + stated_length() + tunable_count();
 }
 
 PRIVATE void journal_place(Journal *journal, double *numbers) {
@@ -59,7 +59,7 @@ PRIVATE void journal_place(Journal *journal, double *numbers) {
     journal->blocks = numbers;
     journal->backup = numbers + ring;
     journal->present = journal->backup + ring;
-    journal->tunables = journal->present + given_length();
+    journal->tunables = journal->present + stated_length();
     for (unsigned i = 0, n = 0; i < model.variable_count; i++)
         if (is_tunable(i))
             journal->tunables[n++] = model.variables[i].index;
@@ -84,8 +84,8 @@ static double *slot(const Journal *journal, int64_t number) {
 }
 
 static Record record_at(double *place, const Journal *journal) {
-    double *given = place + 3;
-    return (Record){place, place + 1, place + 2, given, given + model.own_inputs + journal->tunable_count};
+    double *stated = place + 3;
+    return (Record){place, place + 1, place + 2, stated, stated + model.own_inputs + journal->tunable_count};
 }
 
 PRIVATE Record journal_record(const Journal *journal, int64_t number) {
@@ -99,16 +99,16 @@ static void copy_numbers(double *target, const double *source, size_t count) {
         memmove(target, source, count * sizeof(double));
 }
 
-PRIVATE void journal_read_given(const Journal *journal, const Runtime *runtime, double *given) {
-    copy_numbers(given, runtime->u, (size_t)model.own_inputs);
+PRIVATE void journal_read_stated(const Journal *journal, const Runtime *runtime, double *stated) {
+    copy_numbers(stated, runtime->u, (size_t)model.own_inputs);
     for (int i = 0; i < journal->tunable_count; i++)
-        given[model.own_inputs + i] = runtime->p[(size_t)journal->tunables[i]];
+        stated[model.own_inputs + i] = runtime->p[(size_t)journal->tunables[i]];
 }
 
-PRIVATE void journal_give(const Journal *journal, Runtime *runtime, const double *given) {
-    copy_numbers(runtime->u, given, (size_t)model.own_inputs);
+PRIVATE void journal_give(const Journal *journal, Runtime *runtime, const double *stated) {
+    copy_numbers(runtime->u, stated, (size_t)model.own_inputs);
     for (int i = 0; i < journal->tunable_count; i++)
-        runtime->p[(size_t)journal->tunables[i]] = given[model.own_inputs + i];
+        runtime->p[(size_t)journal->tunables[i]] = stated[model.own_inputs + i];
 }
 
 static void take_snapshot(const Runtime *runtime, double *place) {
@@ -127,7 +127,7 @@ PRIVATE void journal_append(Journal *journal, const Runtime *runtime, double unt
     *record.t = runtime->clock.t;
     *record.until = until;
     *record.kind = kind;
-    journal_read_given(journal, runtime, record.given);
+    journal_read_stated(journal, runtime, record.stated);
     if (journal->range.end - journal->range.first > JOURNAL_CAPACITY)
         journal->range.first = journal->range.end - JOURNAL_CAPACITY;
 }
@@ -217,7 +217,7 @@ PRIVATE JournalMark journal_saved_range(const Journal *journal, const Runtime *r
 }
 
 static size_t saved_record_length(void) {
-    return 3 + given_length() + payload_length();
+    return 3 + stated_length() + payload_length();
 }
 
 PRIVATE size_t journal_saved_length(JournalMark range) {

@@ -41,7 +41,7 @@ typedef struct {
 } Journal;
 
 typedef struct {
-    double *t, *until, *kind, *given, *payload;
+    double *t, *until, *kind, *stated, *payload;
 } Record;
 
 /* Doubles that a journal needs; none for a model without triggered events. */
@@ -60,8 +60,8 @@ PRIVATE void journal_append(Journal *journal, const Runtime *runtime, double unt
 PRIVATE int64_t journal_find(const Journal *journal, const Runtime *runtime, double stamp);
 
 /* What is given from outside: inputs proper, and tunable parameters. */
-PRIVATE void journal_give(const Journal *journal, Runtime *runtime, const double *given);
-PRIVATE void journal_read_given(const Journal *journal, const Runtime *runtime, double *given);
+PRIVATE void journal_give(const Journal *journal, Runtime *runtime, const double *stated);
+PRIVATE void journal_read_stated(const Journal *journal, const Runtime *runtime, double *stated);
 
 /* Put the runtime at the snapshot before record `number`, and return the record that follows the snapshot. */
 PRIVATE int64_t journal_rewind(const Journal *journal, Runtime *runtime, int64_t number);

@@ -51,7 +51,7 @@ PRIVATE void move_communicate(Runtime *runtime, Journal *journal) {
 static void return_to(Runtime *runtime, const Journal *journal, int64_t number) {
     for (int64_t i = journal_rewind(journal, runtime, number); i < number; i++) {
         Record record = journal_record(journal, i);
-        journal_give(journal, runtime, record.given);
+        journal_give(journal, runtime, record.stated);
         if (*record.kind >= 0.0)
             jump_at(runtime, (int)*record.kind, record.payload);
         else if (*record.kind == RECORD_COMMUNICATION)
@@ -59,11 +59,11 @@ static void return_to(Runtime *runtime, const Journal *journal, int64_t number) 
         else
             runtime_advance(runtime, *record.until);
     }
-    journal_give(journal, runtime, journal_record(journal, number).given);
+    journal_give(journal, runtime, journal_record(journal, number).stated);
 }
 
 static void repeat(Runtime *runtime, Journal *journal, Record record) {
-    journal_give(journal, runtime, record.given);
+    journal_give(journal, runtime, record.stated);
     if (*record.kind >= 0.0)
         move_jump(runtime, journal, (int)*record.kind, record.payload);
     else if (*record.kind == RECORD_COMMUNICATION)
@@ -80,7 +80,7 @@ PRIVATE int move_replay(Runtime *runtime, Journal *journal, int event, double st
         return (int)number;
     bool moving = *journal_record(journal, number).kind == RECORD_ADVANCE;
     int room = 2; /* the event, and the advance to it */
-    journal_read_given(journal, runtime, journal->present);
+    journal_read_stated(journal, runtime, journal->present);
     return_to(runtime, journal, number);
     journal_make_room(journal, number, room);
     if (moving)

@@ -33,8 +33,8 @@ class WheelFault(FaultSystem):
     `skid_loss` times that of a skid; it belongs to the input of the same name of `longitudinal_train`.
 
     Args:
-        cause: ``given``, ``drawn`` from the seed, by ``adhesion``, or another one, see `CAUSES`.
-        fault_count: number of faults of ``given``.
+        cause: ``stated``, ``drawn`` from the seed, by ``adhesion``, or another one, see `CAUSES`.
+        fault_count: number of faults of ``stated``.
         distance_from: ``speed``, or ``position``, which adds that input.
 
     Raises:
@@ -67,7 +67,7 @@ class WheelFault(FaultSystem):
         "distance_from": ("speed", "position"),
     }
 
-    def __init__(self, *, cause: str = "given", fault_count: int = 4, distance_from: DistanceFrom = "speed") -> None:
+    def __init__(self, *, cause: str = "stated", fault_count: int = 4, distance_from: DistanceFrom = "speed") -> None:
         require_chosen(self.name, self.option_choices, distance_from=distance_from)
         self.distance_from = distance_from
         self.inputs = (*_INPUTS, *((_POSITION,) if distance_from == "position" else ()))

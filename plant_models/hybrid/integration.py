@@ -102,7 +102,7 @@ def step(
         moved = EXPLICIT[system.method](derivative, t, h, x[:count])
     else:
         at_rest = _at_rest(system, t, x, u, p, sign)
-        moved = _rosenbrock_step(derivative, _given(jacobian, system), t, h, x[:count], at_rest, system.stiff_mask())
+        moved = _rosenbrock_step(derivative, _stated(jacobian, system), t, h, x[:count], at_rest, system.stiff_mask())
     return _before_memory(_stopped(system, moved, sign), x, system)
 
 
@@ -234,7 +234,7 @@ def _friction_sign(system: HybridSystem, x: Array) -> Array | None:
     return _stack([np.sign(x[i]) for i in indices]) if indices else None
 
 
-def _given(jacobian: Jacobian | None, system: HybridSystem) -> Jacobian:
+def _stated(jacobian: Jacobian | None, system: HybridSystem) -> Jacobian:
     """The Jacobian that ``rosenbrock`` needs, the one method besides the explicit ones."""
     if system.method != "rosenbrock":
         raise ValueError(f"{system.name}: unknown method {system.method!r}; use 'rk4', 'rosenbrock' or 'euler'.")

@@ -178,17 +178,17 @@ class HybridSystem(Declarations):
 
     def jump_vector(self, event: str, t: Array, x: Array, u: Array, p: Array) -> Array:
         """`jump` on flat arrays: the state after the event, shape (n,)."""
-        given, unpacked = self.unpack_inputs(u), self.unpack_parameters(p)
+        stated, unpacked = self.unpack_inputs(u), self.unpack_parameters(p)
         if not self._sampling:
-            return self._jumped(event, t, x, given, unpacked)
+            return self._jumped(event, t, x, stated, unpacked)
         count, sampled = self.state_count - 1, self._sampling.get(event)
         names = () if sampled is None else sampled.samples
-        values = [value for name in names for value in self._sample_signals[name].entries(getattr(given, name))]
+        values = [value for name in names for value in self._sample_signals[name].entries(getattr(stated, name))]
         lacking = sum(1.0 - is_there(value) for value in values)
         whole = sampled is not None and not sampled.leaves_out
         if whole:
-            given = given._replace(**{name: or_else(getattr(given, name), 0.0) for name in names})
-        after = self._jumped(event, t, x[:count], given, unpacked)
+            stated = stated._replace(**{name: or_else(getattr(stated, name), 0.0) for name in names})
+        after = self._jumped(event, t, x[:count], stated, unpacked)
         if whole:
             after = np.where(lacking > 0.0, x[:count], after)
         missed = np.reshape(x[count] + lacking, (1, *x.shape[1:]))

@@ -92,21 +92,21 @@ class ControlSystem(HybridSystem):
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """One step of a discrete system: its next state, and the outputs held from now on."""
-        held = {f"held_{name}": value for name, value in self._told(t, x, u, p).items()}
+        held = {f"held_{name}": value for name, value in self._reported(t, x, u, p).items()}
         return self._moved("jump('sampling')", t, x, u, p) | held
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Outputs, of a discrete system those of the last instant."""
         if self._sampled:
             return {s.name: getattr(x, f"held_{s.name}") for s in self.outputs}
-        return self._told(t, x, u, p)
+        return self._reported(t, x, u, p)
 
     def _moved(self, what: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Derivatives, or the next states."""
         values = of_length(self._called(self._update, t, x, u, p), len(self._own), f"{self.name}: {what}")
         return dict(zip(self._own, values, strict=True))
 
-    def _told(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+    def _reported(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Outputs now."""
         values = self._called(self._read, t, x, u, p)
         return {s.name: values[i] for i, s in enumerate(self.outputs)}
@@ -256,17 +256,17 @@ def _signals(
     }
 
 
-def _period(sys: Any, given: float | None) -> float:
+def _period(sys: Any, stated: float | None) -> float:
     """Sample period [s], 0 for a continuous system."""
     if not sys.dt:  # 0, or None, which python-control takes for either
-        if given is not None:
-            raise ValueError(f"{sys.name}: it is continuous, so a sample_period of {given!r} s has no meaning for it.")
+        if stated is not None:
+            raise ValueError(f"{sys.name}: it is continuous, so a sample_period of {stated!r} s has no meaning for it.")
         return 0.0
-    if sys.dt is True and given is None:
+    if sys.dt is True and stated is None:
         raise ValueError(f"{sys.name}: its time base is discrete but unspecified (dt=True); give sample_period [s].")
-    if given is not None and sys.dt is not True and given != sys.dt:
-        raise ValueError(f"{sys.name}: its sample period is {sys.dt!r} s, not {given!r} s; leave sample_period out.")
-    period = float(sys.dt if given is None else given)
+    if stated is not None and sys.dt is not True and stated != sys.dt:
+        raise ValueError(f"{sys.name}: its sample period is {sys.dt!r} s, not {stated!r} s; leave sample_period out.")
+    period = float(sys.dt if stated is None else stated)
     if not 0.0 < period < np.inf:
         raise ValueError(f"{sys.name}: a sample period must be positive and finite [s], got {period!r}.")
     return period

@@ -51,7 +51,7 @@ def main(windows: tuple[int, ...]) -> None:
             block = make_block(FullBaliseMovingHorizon(window=window, loss=loss), fmi_version=2)
             references = {v.name: v.valueReference for v in block.model_description.modelVariables}
             costs = steps(block, references, FULL_STEPS, time.process_time)
-            print(f"{f'to convergence {window} rows, {loss}':40}{told(costs)}", flush=True)
+            print(f"{f'to convergence {window} rows, {loss}':40}{reported(costs)}", flush=True)
 
 
 def measure(name: str, system: HybridSystem, folder: Path) -> None:
@@ -70,10 +70,10 @@ def measure(name: str, system: HybridSystem, folder: Path) -> None:
     slave = FMU2Slave(guid=description.guid, unzipDirectory=unpacked, modelIdentifier=identifier)
     costs = steps(slave, {v.name: v.valueReference for v in description.modelVariables})
     library = next(Path(unpacked, "binaries").glob("*/*")).stat().st_size
-    print(f"{name:40}{told(costs)}{built:12.1f}{library / 1e3:16.0f}", flush=True)
+    print(f"{name:40}{reported(costs)}{built:12.1f}{library / 1e3:16.0f}", flush=True)
 
 
-def told(costs: np.ndarray) -> str:
+def reported(costs: np.ndarray) -> str:
     """Median, 99 % and worst, as columns [us].
 
     Args:

@@ -28,7 +28,7 @@ from cosim.master.algorithms.jacobi import Jacobi  # noqa: E402
 CHAIN = Chain.two()  # undamped: its energy is constant
 DURATION = 2.0
 COUNTS = (100, 200)
-TOLD: dict[str, dict[str, Any]] = {"mean": {}, "value and slope": {"input_derivatives": True}}
+REPORTED: dict[str, dict[str, Any]] = {"mean": {}, "value and slope": {"input_derivatives": True}}
 
 
 def iterate(plan: Plan) -> Iterate:
@@ -39,7 +39,7 @@ def iterate(plan: Plan) -> Iterate:
 ALGORITHMS: dict[str, Any] = {"Jacobi": Jacobi, "Gauss-Seidel": GaussSeidel, "iterate": iterate}
 
 
-def line(cut: Cut, folder: Path, algorithm: str, inputs: str, told: str) -> str:
+def line(cut: Cut, folder: Path, algorithm: str, inputs: str, reported: str) -> str:
     """One row of the table."""
     runs: list[LinearRun] = [
         run_cut(
@@ -50,13 +50,13 @@ def line(cut: Cut, folder: Path, algorithm: str, inputs: str, told: str) -> str:
             n,
             algorithm=ALGORITHMS[algorithm],
             inputs=inputs,
-            capabilities=TOLD.get(told, {}),
+            capabilities=REPORTED.get(reported, {}),
         )
         for n in COUNTS
     ]
     order = np.log2(runs[0].error / runs[1].error)
     sizes = " | ".join(f"{run.error:.1e}" for run in runs)
-    return f"| {cut.name} | {algorithm} | {inputs} | {told} | {sizes} | {order:.2f} | {runs[1].energy_error:.1e} |"
+    return f"| {cut.name} | {algorithm} | {inputs} | {reported} | {sizes} | {order:.2f} | {runs[1].energy_error:.1e} |"
 
 
 def main() -> None:
@@ -69,9 +69,9 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         for name in ("displacement-displacement", "force-displacement", "force-force"):
             for algorithm in ALGORITHMS:
-                for inputs, told in (("hold", "-"), *(("extrapolate", told) for told in TOLD)):
+                for inputs, reported in (("hold", "-"), *(("extrapolate", reported) for reported in REPORTED)):
                     kind = "interpolate" if algorithm == "iterate" and inputs != "hold" else inputs
-                    print(line(cuts(CHAIN)[name], Path(folder), algorithm, kind, told), flush=True)
+                    print(line(cuts(CHAIN)[name], Path(folder), algorithm, kind, reported), flush=True)
 
 
 if __name__ == "__main__":

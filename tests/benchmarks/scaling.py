@@ -161,10 +161,10 @@ class MemoryWatch:
     def __init__(self) -> None:
         self.before = self._most = own_memory()
         self._done = threading.Event()
-        self._thread = threading.Thread(target=self._look)
+        self._thread = threading.Thread(target=self._view)
         self._thread.start()
 
-    def _look(self) -> None:
+    def _view(self) -> None:
         while not self._done.wait(SAMPLING):
             self._most = max(self._most, own_memory())
 

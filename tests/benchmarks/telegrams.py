@@ -90,7 +90,7 @@ def run(kind: str, stepper: str, latency: float, *, counted: bool, stop: float =
     name, step = ("move", System.move) if stepper == "python" else ("_step_all", Master._step_all)
     owner: Any = System if stepper == "python" else Master
 
-    def watched(self: Any, *given: float) -> Any:
+    def watched(self: Any, *stated: float) -> Any:
         balises = self.balises
         logged, called, begin = len(balises.mailbox.log), list[tuple[str, str, str]](), process_time()
 
@@ -102,7 +102,7 @@ def run(kind: str, stepper: str, latency: float, *, counted: bool, stop: float =
 
         sys.setprofile(profile if counted else None)
         try:
-            return step(self, *given)
+            return step(self, *stated)
         finally:
             sys.setprofile(None)
             telegram = len(balises.mailbox.log) > logged

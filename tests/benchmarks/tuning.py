@@ -35,8 +35,8 @@ def main() -> None:
     true = np.stack([outcome[f"motor.{name}"] for name in CURRENTS], axis=1)
 
     def cost(candidates: np.ndarray) -> np.ndarray:
-        given = {"process_variance": candidates[:, :4], "measurement_variance": candidates[:, 4:]}
-        found = replay.run(CURRENTS, given, members=len(candidates))
+        stated = {"process_variance": candidates[:, :4], "measurement_variance": candidates[:, 4:]}
+        found = replay.run(CURRENTS, stated, members=len(candidates))
         return np.asarray((((found - true)[:, 1:]) ** 2).mean(axis=1).sum(axis=1))
 
     for name in ("bbo", "pso", "cma"):
@@ -44,9 +44,9 @@ def main() -> None:
         took = seconds(lambda optimiser=optimiser: minimise(optimiser, cost, 20))  # type: ignore[misc]
         each = 1e3 * took / optimiser.evaluations
         print(f"{name}: {optimiser.evaluations} candidates over {len(true)} samples {took:.2f} s, {each:.1f} ms each")
-    told = AccumulatedOutput(replay.system, replay.inputs(), NAMES)
+    output = AccumulatedOutput(replay.system, replay.inputs(), NAMES)
     print(
-        f"likelihood and its gradient over {len(true)} samples: {seconds(lambda: told([1e-3] * 4 + [0.1] * 2)):.3f} s"
+        f"likelihood and its gradient over {len(true)} samples: {seconds(lambda: output([1e-3] * 4 + [0.1] * 2)):.3f} s"
     )
 
 

@@ -28,7 +28,7 @@ def clock(
 class Clocked(Mock):
     """One time-based clock `tick` of a kind; output `ticks` counts, `seen` keeps all instants.
 
-    `answers` are (interval, qualifier) in the order in which it is asked, the last one for ever.
+    `responses` are (interval, qualifier) in the order in which it is asked, the last one for ever.
     """
 
     capabilities: ClassVar[dict[str, Any]] = {"hasEventMode": True}
@@ -37,10 +37,10 @@ class Clocked(Mock):
     TICK = 90
 
     def __init__(
-        self, kind: str, answers: Sequence[tuple[float, int]] = (), shift: float = 0.0, **attributes: Any
+        self, kind: str, responses: Sequence[tuple[float, int]] = (), shift: float = 0.0, **attributes: Any
     ) -> None:
         self._clock = clock("tick", self.TICK, kind=kind, **attributes)
-        self.answers, self.shift = list(answers), shift
+        self.responses, self.shift = list(responses), shift
         super().__init__()
 
     def more_variables(self) -> list[ModelVariable]:
@@ -78,20 +78,20 @@ class Clocked(Mock):
         self.active = False
         return False, False, False, False, False, 0.0
 
-    def _answer(self) -> tuple[float, int]:
-        answer = self.answers[min(self.asked, len(self.answers) - 1)]
+    def _response(self) -> tuple[float, int]:
+        response = self.responses[min(self.asked, len(self.responses) - 1)]
         self.asked += 1
-        return answer
+        return response
 
     def getIntervalDecimal(self, references: Any, intervals: Any, qualifiers: Any) -> None:
         assert list(references) == [self.TICK]
-        intervals[0], qualifiers[0] = self._answer()
+        intervals[0], qualifiers[0] = self._response()
 
     def getShiftDecimal(self, references: Any, shifts: Any) -> None:
         shifts[0] = self.shift
 
     def getIntervalFraction(self, references: Any, counters: Any, resolutions: Any, qualifiers: Any) -> None:
-        counters[0], resolutions[0], qualifiers[0] = 1, 3, self._answer()[1]
+        counters[0], resolutions[0], qualifiers[0] = 1, 3, self._response()[1]
 
     def getShiftFraction(self, references: Any, counters: Any, resolutions: Any) -> None:
         counters[0], resolutions[0] = 1, 6

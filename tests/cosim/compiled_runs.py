@@ -28,7 +28,7 @@ def steps_compiled(outcome: Outcome) -> int:
     return int(outcome.result.summary["master"]["stepper"]["steps_compiled"])
 
 
-def assert_same(python: Outcome, compiled: Outcome) -> None:
+def assert_equal(python: Outcome, compiled: Outcome) -> None:
     """Tables, telegrams, failures, warnings and counters are the same to the last bit."""
     assert python.result.summary["master"]["stepper"]["name"] == "python"
     assert compiled.result.summary["master"]["stepper"]["name"] == "compiled"

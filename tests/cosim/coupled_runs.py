@@ -99,7 +99,7 @@ class Listener(HybridSystem):
     """Keeps what it is told: the last position, when, how often; between balises it integrates its input."""
 
     name = "listener"
-    states = (state("integral", "m"), memory("told", "m"), memory("told_at", "s", -1.0), memory("count", "1"))
+    states = (state("integral", "m"), memory("reported", "m"), memory("notified_at", "s", -1.0), memory("count", "1"))
     inputs = (input_signal("speed", "m/s"),)
     outputs = (
         output_signal("integrated", "m"),
@@ -114,10 +114,10 @@ class Listener(HybridSystem):
         return {"integral": u.speed}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"integrated": x.integral, "last": x.told, "at": x.told_at, "heard": x.count}
+        return {"integrated": x.integral, "last": x.reported, "at": x.notified_at, "heard": x.count}
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"told": u.balise_position, "told_at": t, "count": x.count + 1.0}
+        return {"reported": u.balise_position, "notified_at": t, "count": x.count + 1.0}
 
 
 @dataclass

@@ -93,7 +93,7 @@ class Worn(InFlow):
         return {"x": p.gain * (1.0 - x.x)}
 
 
-class Judged(DiscreteMeasurementObserver):
+class Evaluated(DiscreteMeasurementObserver):
     """Fails where it is asked for what it knows of itself."""
 
     def error_bounds(self, *_: Any) -> Any:

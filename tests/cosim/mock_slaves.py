@@ -71,8 +71,8 @@ class Mock:
         self._starts: dict[str, float] = {}
         variables = []
         for causality, group in table:
-            for name, given in group.items():
-                start, unit = given if isinstance(given, tuple) else (given, None)
+            for name, stated in group.items():
+                start, unit = stated if isinstance(stated, tuple) else (stated, None)
                 self.references[name] = len(self.references) + 1
                 self._starts[name] = start
                 fixed = {"variability": "fixed"} if causality == "parameter" else {}
@@ -152,13 +152,13 @@ class Mock:
         return values
 
     def _set(self, references: Iterable[int], values: Iterable[Any]) -> None:
-        given = list(values)
+        stated = list(values)
         shaped = {v.name for v in self.model_description.modelVariables if v.shape}
         for name, size in self._sizes(references):
-            taken, given = given[:size], given[size:]
+            taken, stated = stated[:size], stated[size:]
             assert len(taken) == size
             self.v[name] = taken if name in shaped else taken[0]
-        assert not given
+        assert not stated
 
     getReal = getFloat64 = getFloat32 = getString = getBinary = _get
     setReal = setFloat64 = setFloat32 = setString = setBinary = _set

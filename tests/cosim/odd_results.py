@@ -104,7 +104,7 @@ def bits(table: np.ndarray) -> tuple[tuple[str, ...] | None, bytes]:
     return table.dtype.names, table.tobytes()
 
 
-def assert_same(result: Result, back: Result) -> None:
+def assert_equal(result: Result, back: Result) -> None:
     """The same table bit by bit, the same signals, the same telegrams; `repr`, since NaN differs from itself."""
     assert bits(back.table) == bits(result.table)
     assert list(back.signals) == list(result.signals)

@@ -74,8 +74,8 @@ def _events(stamps: np.ndarray, t: np.ndarray, position: np.ndarray) -> list[Bal
         if i % 23 == 5:
             events.append(BaliseRecord(stamp, math.nan, f"B{i}", p, p, kind="missed", method="rollback"))
         elif i % 41 == 11:
-            told = dict.fromkeys(OBSERVERS, "rejected")
-            events.append(BaliseRecord(stamp, stamp, f"B{i}", p + 80, p, kind="false", outcomes=told))
+            reported = dict.fromkeys(OBSERVERS, "rejected")
+            events.append(BaliseRecord(stamp, stamp, f"B{i}", p + 80, p, kind="false", outcomes=reported))
         else:
             events.append(
                 BaliseRecord(stamp, stamp + 0.02, f"B{i}", p, p, 1.0, 13.0, "true", "rollback", 1e-9, outcomes)

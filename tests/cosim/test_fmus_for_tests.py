@@ -438,7 +438,7 @@ def test_every_type_comes_back_with_its_twist(version: Any, folder: Path) -> Non
         assert one.get("y_float64") == VALUES["Float64"] + 1.0
         if version == 1:
             one.set("u_negated", 2.0)  # as the bare slave sees it: signs are the importer's business
-            assert [one.get("w"), one.get("y_same"), one.get("y_negated")] == [2.0, 1.1, 1.1]
+            assert [one.get("w"), one.get("y_equal"), one.get("y_negated")] == [2.0, 1.1, 1.1]
 
 
 def test_arrays_come_back_with_their_twist(folder: Path) -> None:
@@ -691,14 +691,14 @@ def test_discarding(version: Any, behaviour: Any, folder: Path) -> None:
         with pytest.raises(FMICallException, match="discard"):
             one.step(0.3)
         assert one.log[-1][0] == 2
-        tells = behaviour == "discard" and version < 3
-        if tells:
+        reports = behaviour == "discard" and version < 3
+        if reports:
             last = one.slave.getRealStatus(2)
             assert (last.value if version == 1 else last) == 0.25
         elif version < 3:
             with pytest.raises(FMICallException):
                 one.slave.getRealStatus(2)
-        one.time = 0.25 if tells else 0.2
+        one.time = 0.25 if reports else 0.2
         for t in np.arange(one.time + 0.025, 0.31, 0.025):  # short steps pass
             one.step(t)
         assert one.get("y") == pytest.approx(0.3)

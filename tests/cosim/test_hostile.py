@@ -69,7 +69,7 @@ def start(fmu: Path, folder: Path, deed: str, *options: str, **master: Any) -> s
     return subprocess.Popen(command, cwd=folder, start_new_session=True, **streams)
 
 
-def told(process: subprocess.Popen[str]) -> str:
+def reported(process: subprocess.Popen[str]) -> str:
     """What a command that is to end with 2 wrote to its error stream."""
     try:
         _, error = process.communicate(timeout=60)
@@ -92,7 +92,7 @@ DEATHS = [
 def test_a_death_is_reported_and_every_row_is_kept(
     fmu: Path, tmp_path: Path, deed: str, stepper: str, words: str
 ) -> None:
-    error = told(start(fmu, tmp_path, deed, stepper=stepper))
+    error = reported(start(fmu, tmp_path, deed, stepper=stepper))
     assert f"component 'bad' {words}" in error
     result = load_result(tmp_path / "out")
     assert result.time[-1] == pytest.approx(0.24)
@@ -103,7 +103,7 @@ def test_a_death_is_reported_and_every_row_is_kept(
 
 
 def test_what_was_streamed_is_whole(fmu: Path, tmp_path: Path) -> None:
-    told(start(fmu, tmp_path, "crashes", "--stream", stepper="python"))
+    reported(start(fmu, tmp_path, "crashes", "--stream", stepper="python"))
     result = load_result(tmp_path / "out")
     assert len(result.table) == 25
     assert "SIGSEGV" in str(result.failure)
@@ -128,7 +128,7 @@ def test_results_are_written_before_anything_is_closed(fmu: Path, monkeypatch: p
 
 @pytest.mark.parametrize("deed", ["crashes-when-freed", "crashes-when-terminated"])
 def test_a_crash_at_the_end_loses_nothing(fmu: Path, tmp_path: Path, deed: str) -> None:
-    error = told(start(fmu, tmp_path, deed))
+    error = reported(start(fmu, tmp_path, deed))
     assert f"The results were written before: {tmp_path / 'out'}" in error  # absolute, though it was not given so
     result = load_result(tmp_path / "out")
     assert (len(result.table), result.failure) == (51, None)
@@ -136,7 +136,7 @@ def test_a_crash_at_the_end_loses_nothing(fmu: Path, tmp_path: Path, deed: str) 
 
 
 def test_a_call_past_its_limit_ends_the_run_in_words(fmu: Path, tmp_path: Path) -> None:
-    error = told(start(fmu, tmp_path, "hangs", call_timeout=0.5))
+    error = reported(start(fmu, tmp_path, "hangs", call_timeout=0.5))
     assert "component 'bad' in doStep at t = 0.24 s has not returned for 0.5 s" in error
     assert len(load_result(tmp_path / "out").table) == 25
 
@@ -194,7 +194,7 @@ def test_ctrl_c_works_while_an_fmu_hangs(fmu: Path, tmp_path: Path, number: sign
         time.sleep(0.05)
     time.sleep(0.5)
     process.send_signal(number)
-    assert "component 'bad' in doStep at t = 0.24 s does not return; the run was interrupted" in told(process)
+    assert "component 'bad' in doStep at t = 0.24 s does not return; the run was interrupted" in reported(process)
     assert len(load_result(tmp_path / "out").table) == 25
 
 
@@ -352,8 +352,8 @@ def test_a_damaged_fmu_in_the_cache_is_built_again(
     entry.path.write_bytes(whole[:first_byte] + b"\xff" + whole[first_byte + 1 :] if damage is None else damage)
     assert cache.cache_entry(system, 2).draft is not None
     assert cache.cache_entry(PLANTS["odometer"](), 2).draft is not None
-    told = f"The cached FMU {entry.path} is not the one that was put there; it is built again."
-    assert [record.getMessage() for record in caplog.records] == [told] * 3
+    reported = f"The cached FMU {entry.path} is not the one that was put there; it is built again."
+    assert [record.getMessage() for record in caplog.records] == [reported] * 3
 
 
 class FakeDraft:

@@ -49,9 +49,9 @@ def test_between_samples_it_solves_the_equations_of_the_adaptive_law(learnt: tup
     )
     V, noise, Phi = spread(rng, 7), spread(rng, 2), rng.normal(size=(2, 3))
     shapes = [(2, 2), (2, 3), (2, 3), (3, 3), (3, 3), (7, 7), (3,), (2,)]
-    told = np.zeros((7, 7))  # (eta, constants, c) to (xh - x, constants, w - y)
-    told[:2, :2], told[:2, 2:5], told[2:5, 2:5] = np.eye(2), sensitivity, np.eye(3)
-    told[5:, :5], told[5:, 5:] = C @ told[:2, :5], -np.eye(2)
+    reported = np.zeros((7, 7))  # (eta, constants, c) to (xh - x, constants, w - y)
+    reported[:2, :2], reported[:2, 2:5], reported[2:5, 2:5] = np.eye(2), sensitivity, np.eye(3)
+    reported[5:, :5], reported[5:, 5:] = C @ reported[:2, :5], -np.eye(2)
     disturbed = np.vstack([np.eye(2), np.zeros((3, 2)), C])
 
     def flow(_t: float, values: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ def test_between_samples_it_solves_the_equations_of_the_adaptive_law(learnt: tup
             ]
         )
 
-    first = (np.eye(2), sensitivity, seen, R, np.diag(mask) @ R @ np.diag(mask), told @ V @ told.T, delta, c)
+    first = (np.eye(2), sensitivity, seen, R, np.diag(mask) @ R @ np.diag(mask), reported @ V @ reported.T, delta, c)
     solved = solve_ivp(
         flow, (0.0, SPAN), np.concatenate([np.ravel(v) for v in first]), "DOP853", rtol=1e-11, atol=1e-12
     )

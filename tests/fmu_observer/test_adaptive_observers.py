@@ -51,9 +51,9 @@ def printed(hold: bool, period: float, count: int) -> np.ndarray:
 def test_the_equations_are_the_printed_ones(make: type[AdaptivePredictor | AdaptiveHold]) -> None:
     period, count = PERIODS[make.name], 15
     found = Samples(make(), period, count * period, internal_step=1e-3)
-    told = [found[name][-1] for name in ("x1", "x2", "rho1", "rho2")]
+    reported = [found[name][-1] for name in ("x1", "x2", "rho1", "rho2")]
     # RK4 at 1 ms against DOP853: 20 rad/s times 1 ms to the fourth
-    np.testing.assert_allclose(told, printed(make is AdaptiveHold, period, count), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(reported, printed(make is AdaptiveHold, period, count), rtol=1e-6, atol=1e-6)
 
 
 def test_convergence_as_measured_independently() -> None:
@@ -116,10 +116,10 @@ def test_the_covariance_is_that_of_the_responses_to_each_sample(make: type[Adapt
         kick[k] = 1.0
         kicked = Samples(make(), period, end, noise=kick)
         responses.append([kicked[n][-1] - zero[n][-1] for n in ("rho1", "rho2")])
-    told = Samples(make(), period, end, noise_deviation=sigma, error_covariance=0.0)
+    reported = Samples(make(), period, end, noise_deviation=sigma, error_covariance=0.0)
     expected = sigma * np.sqrt(np.sum(np.square(responses), axis=0))
     # the same step for both, so what differs is how RK4 treats a product and its factors
-    np.testing.assert_allclose([told["rho1_deviation"][-1], told["rho2_deviation"][-1]], expected, rtol=1e-4)
+    np.testing.assert_allclose([reported["rho1_deviation"][-1], reported["rho2_deviation"][-1]], expected, rtol=1e-4)
 
 
 @pytest.mark.parametrize(

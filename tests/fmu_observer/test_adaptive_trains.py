@@ -35,7 +35,7 @@ class Ride:
             self.set(balise_position=100.0 + SPEED * t + wrong)
             self.runtime.trigger("balise")
 
-    def told(self) -> dict[str, Any]:
+    def reported(self) -> dict[str, Any]:
         names = scalar_names(self.observer.outputs)
         return dict(zip(names, map(float, self.runtime.update_outputs()), strict=True))
 
@@ -49,19 +49,19 @@ def test_the_wheel_radius_is_found_without_noise(wheel: HybridSystem) -> None:
     ride = Ride(wheel)
     ride.past([3.0, 29.0, 31.0, 35.0, 37.0, 60.0, 80.0])
     ride.runtime.advance(85.0)
-    told = ride.told()
-    assert told["wheel_radius_error"] == pytest.approx(ERROR, rel=0.01)
-    assert told["position"] == pytest.approx(100.0 + SPEED * 85.0, abs=1.0)
-    assert told["speed"] == pytest.approx(SPEED, rel=1e-4)
-    assert told["wheel_radius_error_deviation"] < 1e-3
+    reported = ride.reported()
+    assert reported["wheel_radius_error"] == pytest.approx(ERROR, rel=0.01)
+    assert reported["position"] == pytest.approx(100.0 + SPEED * 85.0, abs=1.0)
+    assert reported["speed"] == pytest.approx(SPEED, rel=1e-4)
+    assert reported["wheel_radius_error_deviation"] < 1e-3
 
 
 def test_the_position_is_that_of_the_first_balise_and_readings_may_be_old(wheel: HybridSystem) -> None:
     ride = Ride(wheel, reading_age=0.2)
     ride.past([3.0])
-    told = ride.told()
-    assert told["position"] == pytest.approx(100.0 + SPEED * 3.0, abs=1e-9)
-    assert told["position_deviation"] == pytest.approx(0.5)  # that of the balise
+    reported = ride.reported()
+    assert reported["position"] == pytest.approx(100.0 + SPEED * 3.0, abs=1e-9)
+    assert reported["position_deviation"] == pytest.approx(0.5)  # that of the balise
 
 
 def test_its_variance_is_the_sum_of_the_responses_to_each_balise(wheel: HybridSystem) -> None:
@@ -71,7 +71,7 @@ def test_its_variance_is_the_sum_of_the_responses_to_each_balise(wheel: HybridSy
         ride = Ride(wheel, gate=0.0)
         ride.past(instants, 1e-3 * (np.arange(len(instants)) == k))
         ride.runtime.advance(70.0)
-        ends.append(ride.told()["wheel_radius_error"])
+        ends.append(ride.reported()["wheel_radius_error"])
     responses = (np.array(ends[1:]) - ends[0]) / 1e-3
     still = Ride(wheel, odometer_deviation=0.0)
     place = [i for i, s in enumerate(scalar_names(wheel.states)) if s.startswith("error_covariance")][3]
@@ -80,31 +80,31 @@ def test_its_variance_is_the_sum_of_the_responses_to_each_balise(wheel: HybridSy
     still.runtime.advance(70.0)
     expected = 0.5 * np.sqrt(np.sum(responses**2))
     # first order in the constant, which is still 1 % off at the start of the response
-    assert still.told()["wheel_radius_error_deviation"] == pytest.approx(expected, rel=0.03)
+    assert still.reported()["wheel_radius_error_deviation"] == pytest.approx(expected, rel=0.03)
 
 
 def test_at_standstill_the_wheel_radius_is_held_and_without_balises_it_becomes_unsure(wheel: HybridSystem) -> None:
     ride = Ride(wheel, forgetting=0.0)
     ride.past([3.0, 20.0])
     ride.runtime.advance(80.0)
-    assert ride.told()["wheel_radius_learnt"] == 1.0
-    sure = ride.told()["position_deviation"]
+    assert ride.reported()["wheel_radius_learnt"] == 1.0
+    sure = ride.reported()["position_deviation"]
     ride.runtime.advance(200.0)
-    assert ride.told()["position_deviation"] > 2.0 * sure
+    assert ride.reported()["position_deviation"] > 2.0 * sure
     rest = Ride(wheel)
     rest.set(odometer=0.0)
     rest.past([3.0, 20.0], [0.0, -SPEED * 17.0])
-    before = rest.told()
+    before = rest.reported()
     rest.runtime.advance(400.0)
-    assert (before["wheel_radius_learnt"], rest.told()["wheel_radius_learnt"]) == (0.0, 0.0)
-    assert rest.told()["wheel_radius_error"] == before["wheel_radius_error"]
+    assert (before["wheel_radius_learnt"], rest.reported()["wheel_radius_learnt"]) == (0.0, 0.0)
+    assert rest.reported()["wheel_radius_error"] == before["wheel_radius_error"]
 
 
 def test_the_first_balise_after_long_does_not_make_it_stiff(wheel: HybridSystem) -> None:
     ride = Ride(wheel)
     ride.past([3.0, 400.0, 401.0])  # 12 km: without a limit the adaptation would be far too quick for its step
     ride.runtime.advance(450.0)
-    assert ride.told()["wheel_radius_error"] == pytest.approx(ERROR, rel=0.05)
+    assert ride.reported()["wheel_radius_error"] == pytest.approx(ERROR, rel=0.05)
 
 
 def test_davis_coefficients_are_found_where_speed_varies() -> None:
@@ -133,14 +133,16 @@ def test_davis_coefficients_are_found_where_speed_varies() -> None:
         v, x = v + h * acceleration, after
         runtime.u[u.index("odometer")] = v + 0.05 * rng.normal()
         runtime.advance(t + h)
-    told = dict(zip(names, map(float, runtime.update_outputs()), strict=True))
+    reported = dict(zip(names, map(float, runtime.update_outputs()), strict=True))
     resistance = (davis[0] + davis[1] * v + davis[2] * v * v) / mass
     assert (
-        abs(told["resistance_per_mass"] - resistance) < 3.0 * told["resistance_per_mass_deviation"] < 0.2 * resistance
+        abs(reported["resistance_per_mass"] - resistance)
+        < 3.0 * reported["resistance_per_mass_deviation"]
+        < 0.2 * resistance
     )
     for name, value in zip("abc", davis, strict=True):
-        found, deviation = told[f"davis_{name}_per_mass"], told[f"davis_{name}_per_mass_deviation"]
+        found, deviation = reported[f"davis_{name}_per_mass"], reported[f"davis_{name}_per_mass_deviation"]
         assert abs(found - value / mass) < 3.0 * deviation, name
-        assert told[f"davis_{name}_per_mass_learnt"] == 1.0
-    assert abs(told["speed"] - v) < 0.05
-    assert abs(told["position"] - x) < 2.0
+        assert reported[f"davis_{name}_per_mass_learnt"] == 1.0
+    assert abs(reported["speed"] - v) < 0.05
+    assert abs(reported["position"] - x) < 2.0

@@ -114,8 +114,8 @@ def test_every_preset_is_certified_for_what_it_is_for(make: type[AugmentedTrainO
         assert certificate.limit == pytest.approx(limit, abs=1e-3)
         assert certificate.limit <= certificate.condition(CONSTANT_GAP).limit
         assert ("'gps' samples" if preset == "gps" else "'balise' samples") in certificate.explain()
-    told = next(observer.findings(0.5)).explain()
-    assert f"fixes and balises in any order certified for gaps up to 0.1 s ({MIXED[make]})" in told
+    reported = next(observer.findings(0.5)).explain()
+    assert f"fixes and balises in any order certified for gaps up to 0.1 s ({MIXED[make]})" in reported
     for gap, kinds in ((0.3, "fixes and balises in any order"), (2.5, "fixes alone")):
         certificate = next(observer.findings(0.5, {"fix_period": gap}))
         assert not certificate.holds

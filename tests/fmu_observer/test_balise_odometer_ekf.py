@@ -79,23 +79,23 @@ def test_a_locked_wheel_is_not_believed_and_the_reading_after_it_is() -> None:
     runner = running()
     runner.set("x", {"estimated_speed": 20.0})
     runner.runtime.start(0.0)
-    told, nis, likelihood = {}, [], {}
+    reported, nis, likelihood = {}, [], {}
     for k in range(1, 200):
         t = k * PERIOD
         speed = 20.0 + (EFFORT - DRAG * 20.0) / MASS * t
         runner.set("u", {"odometer": 0.0 if 8.05 < t < 8.95 else speed})
         runner.runtime.advance(t)
         values = runner.outputs()
-        told[round(t, 1)] = (values["odometer_fault"], values["speed"] - speed)
+        reported[round(t, 1)] = (values["odometer_fault"], values["speed"] - speed)
         nis.append(values["nis"])
         likelihood[round(t, 1)] = values["innovation_likelihood"]
-    assert [fault for t, (fault, _) in told.items() if 8.05 < t < 8.95] == [1.0] * 9
+    assert [fault for t, (fault, _) in reported.items() if 8.05 < t < 8.95] == [1.0] * 9
     assert max(nis) <= 4.0**2  # of readings that were used: the gate is at four standard deviations
     during = [likelihood[round(8.0 + 0.1 * i, 1)] for i in range(10)]
     assert len(set(during)) == 1  # refused readings say nothing of how likely the others were
-    assert not any(fault for t, (fault, _) in told.items() if 2.0 < t < 8.0 or t > 9.05)
+    assert not any(fault for t, (fault, _) in reported.items() if 2.0 < t < 8.0 or t > 9.05)
     # the true drag falls short of the linear one of the test's speed by 0.06 m/s in 20 s
-    assert max(abs(error) for t, (_, error) in told.items() if t > 5.0) < 0.1
+    assert max(abs(error) for t, (_, error) in reported.items() if t > 5.0) < 0.1
 
 
 def test_an_old_reading_is_moved_by_the_acceleration_since() -> None:
@@ -188,13 +188,13 @@ def test_readings_that_are_refused_for_long_are_believed_again() -> None:
     runner.set("x", {"estimated_speed": 0.0})
     runner.set("u", {"odometer": 18.0, "effort": -30e3})
     runner.runtime.start(0.0)
-    told = {}
+    reported = {}
     for k in range(1, 400):
         runner.runtime.advance(k * PERIOD)
         values = runner.outputs()
-        told[round(k * PERIOD, 1)] = (values["speed"], values["odometer_fault"])
-    assert [fault for t, (_, fault) in told.items() if t < 14.85] == [1.0] * 148
-    assert told[14.9][1] == told[20.0][1] == 0.0
-    assert told[14.9][0] == pytest.approx(18.0, abs=1e-9)
+        reported[round(k * PERIOD, 1)] = (values["speed"], values["odometer_fault"])
+    assert [fault for t, (_, fault) in reported.items() if t < 14.85] == [1.0] * 148
+    assert reported[14.9][1] == reported[20.0][1] == 0.0
+    assert reported[14.9][0] == pytest.approx(18.0, abs=1e-9)
     # 18 m/s for 15 s are 270 m that it may be off, and the first one of 100 m
     assert runner.outputs()["position_std"] > 270.0

@@ -104,12 +104,12 @@ def test_event_mode_on_a_block_instantiated_without_it_is_refused_in_words() -> 
 def test_simulate_fmu_carries_events_through_fmi2_inputs() -> None:
     """fmpy sets its columns at its own communication points; the stamp says where inside the step the event belongs."""
     # the last one is late
-    told = {3: (3 * H + 0.011, kick(2.0)), 9: (9 * H + 0.03, kick(-1.0)), 10: (9 * H + 0.04, kick(0.5))}
+    reported = {3: (3 * H + 0.011, kick(2.0)), 9: (9 * H + 0.03, kick(-1.0)), 10: (9 * H + 0.04, kick(0.5))}
     names = ["kick_count", "kick_time", "kick_impulse", "kick_share[1]", "kick_share[2]"]
     rows, values = [], dict.fromkeys(names, 0.0)
     for k in range(21):
-        if k in told:
-            stamp, payload = told[k]
+        if k in reported:
+            stamp, payload = reported[k]
             values |= payload | {"kick_time": stamp, "kick_count": values["kick_count"] + 1}
         rows.append((k * H, *(values[name] for name in names)))
     types = [("time", np.float64), (names[0], np.int32), *((name, np.float64) for name in names[1:])]
@@ -118,7 +118,7 @@ def test_simulate_fmu_carries_events_through_fmi2_inputs() -> None:
     assert (block.counters.accepted, block.counters.replayed, block.counters.lost) == (3, 1, 0)
     bare = Reference(SWING).start()
     for k in range(20):
-        events = [(told[i][0], "kick", told[i][1]) for i in told if int(told[i][0] / H) == k]
+        events = [(reported[i][0], "kick", reported[i][1]) for i in reported if int(reported[i][0] / H) == k]
         bare.step(k * H, H, events)
     last = np.array([result[name][-1] for name in STATES])
     np.testing.assert_allclose(last, bare.values()[3:], rtol=ROUNDING, atol=ROUNDING)

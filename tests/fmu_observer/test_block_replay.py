@@ -33,14 +33,14 @@ class Happening:
         return int(np.searchsorted(np.arange(STEPS) * H, self.stamp + 1e-15, side="right")) - 1
 
     @property
-    def told(self) -> int:
+    def reported(self) -> int:
         """Number of the communication point at which it is told; a nanosecond later is not late but now, so one later
         then.
         """
-        told = min(STEPS, self.step + self.delay)
-        if self.delay > 0 and told * H - self.stamp < 1.1e-9:
-            return told + 1 if told < STEPS else self.step
-        return told
+        reported = min(STEPS, self.step + self.delay)
+        if self.delay > 0 and reported * H - self.stamp < 1.1e-9:
+            return reported + 1 if reported < STEPS else self.step
+        return reported
 
 
 TIMES = st.one_of(
@@ -66,14 +66,14 @@ def _distinguishable(happenings: list[Happening]) -> bool:
     return bool((np.diff(sorted(h.stamp for h in happenings)) > 3e-9).all())
 
 
-def _run(driven: Driven, happenings: list[Happening], given_at: Any, in_time: bool) -> np.ndarray:
+def _run(driven: Driven, happenings: list[Happening], notified_at: Any, in_time: bool) -> np.ndarray:
     """Step through and tell each event at its own step's start, or late, in the order of the list."""
     driven.start()
     for k in range(STEPS + 1):
-        told = [h for h in happenings if (h.step if in_time else h.told) == k]
+        reported = [h for h in happenings if (h.step if in_time else h.reported) == k]
         if k < STEPS:
-            driven.set_all(given_at(k))
-        for happening in told:
+            driven.set_all(notified_at(k))
+        for happening in reported:
             driven.event(happening.name, happening.stamp, happening.payload)
         if k < STEPS:
             driven.step(k * H)
@@ -89,7 +89,7 @@ def test_any_events_notified_late_in_any_order_give_what_notifying_in_time_gives
     expected = _run(ON_TIME, happenings, weather, in_time=True)
     found = _run(LATE, happenings, weather, in_time=False)
     np.testing.assert_array_equal(found, expected)
-    assert LATE.block.counters.replayed == len([h for h in happenings if h.told > h.step])
+    assert LATE.block.counters.replayed == len([h for h in happenings if h.reported > h.step])
     assert LATE.block.counters.accepted == ON_TIME.block.counters.accepted == len(happenings)
     assert ON_TIME.block.counters.replayed == 0
 
@@ -169,9 +169,9 @@ def test_each_policy_does_what_it_says(policy: Any) -> None:
         "reject": {"rejected": 1},
         "late": {"accepted": 1, "late": 1},
     }[policy]
-    same_as_plain = bool((driven.get("angle", "rate", "sample") == plain.get("angle", "rate", "sample")).all())
-    same_as_now = bool((driven.get("angle", "rate", "sample") == now.get("angle", "rate", "sample")).all())
-    assert (same_as_plain, same_as_now) == {"replay": (False, False), "reject": (True, False), "late": (False, True)}[
+    equal_to_plain = bool((driven.get("angle", "rate", "sample") == plain.get("angle", "rate", "sample")).all())
+    equal_to_now = bool((driven.get("angle", "rate", "sample") == now.get("angle", "rate", "sample")).all())
+    assert (equal_to_plain, equal_to_now) == {"replay": (False, False), "reject": (True, False), "late": (False, True)}[
         policy
     ]
 

@@ -54,8 +54,8 @@ def test_both_faces_and_the_runtime_give_equal_bits(plan: list[Any], start_time:
         expected = BARE.values()
         np.testing.assert_array_equal(FMI2.get(*VALUES), expected)
         np.testing.assert_array_equal(FMI3.get(*VALUES), expected)
-    told = sum((kicked is not None) + (marked is not None) for kicked, marked in plan)
-    assert FMI2.block.counters.accepted == FMI3.block.counters.accepted == told
+    reported = sum((kicked is not None) + (marked is not None) for kicked, marked in plan)
+    assert FMI2.block.counters.accepted == FMI3.block.counters.accepted == reported
 
 
 @pytest.mark.parametrize("name", ["differentiator_cdo", "takagi_sugeno_cdo", "multirate_cdo", "discrete_uio"])

@@ -181,7 +181,7 @@ def test_a_learnt_spacing_may_be_off_twice() -> None:
     """The longest spacing after the shortest: theta times gap is 2.5 * 1.2 / 0.8 = 3.75 and not 3.0, and the gain
     changes too.
     """
-    expected, learnt = (certify_adapting_gain(rule(learnt=told), 5.0, "model") for told in (False, True))
+    expected, learnt = (certify_adapting_gain(rule(learnt=reported), 5.0, "model") for reported in (False, True))
     assert expected.holds
     assert learnt.holds
     # it does not speak of learnt ones
@@ -191,8 +191,10 @@ def test_a_learnt_spacing_may_be_off_twice() -> None:
 
 
 def test_the_observer_that_learns_is_certified_as_one() -> None:
-    given_error = {"assumed_spacing_error": 0.1}
-    expected, learnt = (next(AdaptiveGainCdo(spacing=way).findings(5.0, given_error)) for way in ("expected", "learnt"))
+    stated_error = {"assumed_spacing_error": 0.1}
+    expected, learnt = (
+        next(AdaptiveGainCdo(spacing=way).findings(5.0, stated_error)) for way in ("expected", "learnt")
+    )
     assert learnt.limit < 0.8 * expected.limit
     assert "a spacing learnt within the same range" in learnt.explain()
     exact = [next(AdaptiveGainCdo(spacing=way).findings(5.0)).limit for way in ("expected", "learnt")]

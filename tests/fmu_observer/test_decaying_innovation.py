@@ -241,14 +241,14 @@ def test_the_communication_step_does_not_matter(make: Any) -> None:
         block.setReal([at["internal_step"]], [1e-3])
         block.enterInitializationMode()
         block.exitInitializationMode()
-        told = 0
+        reported = 0
         for k in range(2000 // milliseconds):
-            if 0.137 * (told + 1) <= 1e-3 * milliseconds * (k + 1) + 1e-12:
-                told += 1
-                block.setReal([at["sample_time"], at["sample_x1"]], [0.137 * told, float(np.cos(told))])
-                block.setInteger([at["sample_count"]], [told])
+            if 0.137 * (reported + 1) <= 1e-3 * milliseconds * (k + 1) + 1e-12:
+                reported += 1
+                block.setReal([at["sample_time"], at["sample_x1"]], [0.137 * reported, float(np.cos(reported))])
+                block.setInteger([at["sample_count"]], [reported])
             block.doStep(1e-3 * milliseconds * k, 1e-3 * milliseconds)
-        assert told == 14
+        assert reported == 14
         ends.append(block.getReal([at["x1"], at["x2"]]))
     np.testing.assert_allclose(ends[1:], [ends[0]] * 2, rtol=1e-11, atol=1e-11)
 

@@ -9,9 +9,9 @@ from fmu_observer.formulas.diagnosis.redundancy import larger
 from fmu_observer.formulas.diagnosis.residual_filters import filtered, residual_filter, settled
 from fmu_observer.formulas.diagnosis.window_inversion import (
     Alarm,
+    evaluate,
     grid_around,
     invert,
-    judge,
     smoothed,
     windowed_square,
 )
@@ -27,9 +27,9 @@ def test_filters_are_tustins_of_scipy(order: int, tau: float) -> None:
     signal = np.random.default_rng(order).normal(size=300)
     coefficients, memory, found = residual_filter(tau, period), (0.0, 0.0), []
     for value in signal:
-        given = [0.0, 0.0, 0.0]
-        given[order] = value
-        out = filtered(coefficients, memory, *given)
+        stated = [0.0, 0.0, 0.0]
+        stated[order] = value
+        out = filtered(coefficients, memory, *stated)
         memory = out.memory
         found.append(out.value)
     expected = scipy.signal.lfilter(b, a, signal)
@@ -58,11 +58,11 @@ def test_an_alarm_waits_for_samples_in_a_row() -> None:
     above = [1, 1, 0, 1, 1, 1, 0, 1, 0, 0, 1, 0, 0, 0]
     alarm, raised = Alarm(0.0, 0.0, 0.0), []
     for k, exceeds in enumerate(above):
-        alarm = judge(alarm, 0.1 * k, exceeds, raise_after=3, clear_after=2)
+        alarm = evaluate(alarm, 0.1 * k, exceeds, raise_after=3, clear_after=2)
         raised.append(int(alarm.raised))
     assert raised == [0, 0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0]
     assert alarm.since == pytest.approx(0.9)
-    assert judge(Alarm(0.0, 0.0, 0.0), 7.0, 1.0) == (1.0, 0.0, 7.0)  # without persistence at once
+    assert evaluate(Alarm(0.0, 0.0, 0.0), 7.0, 1.0) == (1.0, 0.0, 7.0)  # without persistence at once
 
 
 def test_sensors_that_disagree_are_distinguished_by_the_model() -> None:

@@ -69,8 +69,8 @@ class OwnTrain:
 
     def hear(self, t: float, *events: str) -> None:
         v, place = self.motion.v(t), self.motion.position(t)
-        told = {"odometer": v, "gps_position": place, "balise_position": place}
-        for name, value in (told | {"effort": self.force(v)}).items():
+        reported = {"odometer": v, "gps_position": place, "balise_position": place}
+        for name, value in (reported | {"effort": self.force(v)}).items():
             if name in self._place:
                 self.runtime.u[self._place[name]] = value
         for event in self.system.triggered_events:
@@ -128,10 +128,10 @@ def test_a_preset_of_a_motor_filter_keeps_the_motor_that_it_believes_in(name: st
     x, largest = np.zeros(system.order), 0.0
     for k in range(round(0.2 / p.sample_period)):
         t = k * p.sample_period
-        told = {n: 3.0 * np.sin(20.0 * t + i) for i, n in enumerate(inputs) if n.startswith("voltage")}
-        for n, value in told.items():
+        reported = {n: 3.0 * np.sin(20.0 * t + i) for i, n in enumerate(inputs) if n.startswith("voltage")}
+        for n, value in reported.items():
             runtime.u[inputs.index(n)] = value
-        seen, _ = system.measure(x, system.unpack_inputs(np.where([n in told for n in inputs], runtime.u, 0.0)), p)
+        seen, _ = system.measure(x, system.unpack_inputs(np.where([n in reported for n in inputs], runtime.u, 0.0)), p)
         runtime.u[[i for i, n in enumerate(inputs) if n.startswith("measured")]] = -np.asarray(seen)
         runtime.start(0.0) if k == 0 else runtime.advance(t)
         largest = max(largest, float(np.abs(runtime.x[:3] - x[:3]).max()))

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.fault_cycle import first_crossing
 from fmu_observer.design.extended_disturbance import extended_gain
-from fmu_observer.detection.threshold_detector import THRESHOLD_MEMORY, THRESHOLD_PARAMETERS, judge
+from fmu_observer.detection.threshold_detector import THRESHOLD_MEMORY, THRESHOLD_PARAMETERS, evaluate
 from fmu_observer.observers.train.stopping_uio import PRINTED_GAIN, observer_matrix, sampled_error
 from plant_models.hybrid import Runtime, scalar_names
 from plant_models.railway.control.stopping_planner import BrakePlan, constant_brake, plan_stop
@@ -118,7 +118,7 @@ def stops() -> Stop:
         released = (known >= onset - 1e-9) & (t >= known + RELEASE - 1e-9)
         jammed = (t < onset + jam - 1e-9) & ~released if np.isfinite(onset) else np.zeros(members, bool)
         innovation = v - z[0]
-        believed = np.where(memory.judged_fault * switches > 0.0, 0.0, B * u)
+        believed = np.where(memory.detected_fault * switches > 0.0, 0.0, B * u)
         z = moved @ z + driven @ (np.stack([believed, 0.0 * u, 0.0 * u]) + GAIN[:, None] * innovation)
         push = np.where(jammed, 0.0, B * u)
         slopes = [push - W0 - W1 * v - W2 * v * v]
@@ -129,9 +129,9 @@ def stops() -> Stop:
         p = p + 0.5 * H * (v + following)
         v = following
         k += 1
-        before, memory = memory, SimpleNamespace(**judge(memory, v - z[0], H, thresholds))
+        before, memory = memory, SimpleNamespace(**evaluate(memory, v - z[0], H, thresholds))
         running = np.isnan(errors) & (v > 0.2)
-        change = memory.judged_fault - before.judged_fault
+        change = memory.detected_fault - before.detected_fault
         begins, ends = running & (change > 0.0), running & (change < 0.0)
         detected += [(k * H, int(i)) for i in np.flatnonzero(begins)]
         recovered += [(k * H, int(i)) for i in np.flatnonzero(ends)]
@@ -209,7 +209,7 @@ def observer(preset: str | None = None, **values: float) -> Any:
     return runtime
 
 
-def told(runtime: Any, name: str) -> float:
+def reported(runtime: Any, name: str) -> float:
     return float(runtime.update_outputs()[scalar_names(runtime.system.outputs).index(name)])
 
 
@@ -234,7 +234,7 @@ def test_a_lost_brake_is_absorbed_by_the_disturbance() -> None:
     runtime.start(0.0)
     runtime.advance(8.0)
     assert runtime.x[1:4] == pytest.approx([20.0, 2.0 + 2.6223, 0.0], abs=1e-4)
-    assert abs(told(runtime, "residual")) < 1e-6
+    assert abs(reported(runtime, "residual")) < 1e-6
 
 
 def test_the_onset_shows_when_the_closed_form_says_so() -> None:
@@ -252,7 +252,7 @@ def test_the_onset_shows_when_the_closed_form_says_so() -> None:
         runtime.u[:2] = -26.223, 20.0
         runtime.start(0.0)
         k = 0
-        while told(runtime, "odometer_fault") == 0.0:
+        while reported(runtime, "odometer_fault") == 0.0:
             k += 1
             runtime.advance(k * period)
         assert k == samples
@@ -261,12 +261,12 @@ def test_the_onset_shows_when_the_closed_form_says_so() -> None:
 def test_the_observer_takes_the_effort_as_zero_while_a_jam_is_detected() -> None:
     """So it goes on to be right about a train that lost its brake: no effort, no error."""
     runtime = observer(
-        estimated_speed=20.0, disturbance_estimate=2.0, disturbance_rate=0.0, judged_fault=1.0, armed=0.0
+        estimated_speed=20.0, disturbance_estimate=2.0, disturbance_rate=0.0, detected_fault=1.0, armed=0.0
     )
     runtime.u[:2] = -26.223, 20.0
     runtime.start(0.0)
     runtime.advance(0.5)
-    assert told(runtime, "odometer_fault") == 1.0
+    assert reported(runtime, "odometer_fault") == 1.0
     assert runtime.x[1:4] == pytest.approx([20.0, 2.0, 0.0], abs=1e-12)
 
 
@@ -279,7 +279,7 @@ def test_held_data_are_reported(held_for: int, held: float) -> None:
     for k in range(1, 450):
         runtime.u[1] = 20.0 - 2.6 * H * held_for * (k // held_for)
         runtime.advance(k * H)
-    assert told(runtime, "held_odometer") == held
+    assert reported(runtime, "held_odometer") == held
 
 
 def test_a_balise_sets_the_position_and_is_counted() -> None:
@@ -289,7 +289,7 @@ def test_a_balise_sets_the_position_and_is_counted() -> None:
     runtime.u[scalar_names(runtime.system.input_signals).index("balise_position")] = 101.5
     speed = runtime.x[1]
     runtime.trigger("balise")
-    assert [told(runtime, name) for name in ("position", "innovation", "balises")] == [101.5, -1.5, 1.0]
+    assert [reported(runtime, name) for name in ("position", "innovation", "balises")] == [101.5, -1.5, 1.0]
     assert runtime.x[1] == speed
 
 

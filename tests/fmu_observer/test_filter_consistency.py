@@ -9,7 +9,7 @@ from fmu_observer.formulas.filtering.covariance_consistency import (
     _is_inside,
     average_over_runs,
     chi_square_band,
-    judge,
+    evaluate,
     normalised_squares,
 )
 
@@ -37,7 +37,7 @@ def runs(process: float = 1.0, measurement: float = 1.0) -> tuple[np.ndarray, np
 
 
 def flagged(squares: np.ndarray, degrees: float, *, white: bool) -> dict[str, float]:
-    verdicts = [judge(row, degrees, white=white).verdict for row in squares]
+    verdicts = [evaluate(row, degrees, white=white).verdict for row in squares]
     return {v: verdicts.count(v) / len(verdicts) for v in ("overconfident", "underconfident")}
 
 
@@ -103,13 +103,13 @@ def test_squares_use_what_is_measured_and_leave_out_what_is_singular() -> None:
 
 
 def test_too_little_and_infinite_are_reported() -> None:
-    assert judge(np.ones(4), 1.0, white=True).verdict == "too few samples"
-    none = judge(np.zeros(0), 1.0, white=True)
+    assert evaluate(np.ones(4), 1.0, white=True).verdict == "too few samples"
+    none = evaluate(np.zeros(0), 1.0, white=True)
     assert (none.verdict, none.samples, none.independent) == ("too few samples", 0, 0.0)
-    assert judge(np.array([1.0] * 9 + [np.inf]), 1.0, white=True).verdict == "not finite"
-    assert judge(np.full(100, 0.1), 1.0, white=True).verdict == "underconfident"
+    assert evaluate(np.array([1.0] * 9 + [np.inf]), 1.0, white=True).verdict == "not finite"
+    assert evaluate(np.full(100, 0.1), 1.0, white=True).verdict == "underconfident"
     missing = np.where(np.arange(100) % 2 == 0, 1.0, 2.0)  # a sample may have one or two measurements
-    assert judge(missing, missing, white=True).verdict == "consistent"
+    assert evaluate(missing, missing, white=True).verdict == "consistent"
 
 
 def test_no_rows_have_no_squares() -> None:

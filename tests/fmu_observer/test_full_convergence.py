@@ -40,7 +40,7 @@ def _followed(system, **parameters):
     return runtime
 
 
-def _told(runtime, *names):
+def _reported(runtime, *names):
     values = dict(zip(scalar_names(runtime.system.outputs), runtime.update_outputs(), strict=True))
     return [values[name] for name in names]
 
@@ -50,8 +50,8 @@ def test_by_least_squares_it_is_the_filter():
     full = _followed(FullBaliseMovingHorizon(window=4, loss="squares"), odometer_gate=1e3, **wide)
     filtered = _followed(BaliseOdometerEkf(), odometer_gate=1e3, gate=0.0)
     assert full.x[:4] == pytest.approx(filtered.x[:4], abs=SOLVED)
-    assert _told(full, "position_std") == pytest.approx(_told(filtered, "position_std"), abs=1e-12)
-    assert _told(full, "converged", "feasible", "deadline_missed") == [1.0, 1.0, 0.0]
+    assert _reported(full, "position_std") == pytest.approx(_reported(filtered, "position_std"), abs=1e-12)
+    assert _reported(full, "converged", "feasible", "deadline_missed") == [1.0, 1.0, 0.0]
 
 
 def test_with_a_robust_loss_it_is_many_passes():
@@ -73,12 +73,12 @@ def test_of_any_model_it_is_many_passes(options):
             runtime.advance(0.1 * (k + 1))
         found.append(runtime.x[: system.model.order].copy())
     assert found[0] == pytest.approx(found[1], abs=SOLVED)
-    assert _told(runtime, "bounds_active") == [1.0 if options else 0.0]
+    assert _reported(runtime, "bounds_active") == [1.0 if options else 0.0]
 
 
 def test_a_deadline_that_is_missed_is_reported_and_bounds_are_kept():
     full = _followed(FullBaliseMovingHorizon(window=5, deadline=0.0), speed_limit=10.0)
-    converged, missed, feasible, speed = _told(full, "converged", "deadline_missed", "feasible", "speed")
+    converged, missed, feasible, speed = _reported(full, "converged", "deadline_missed", "feasible", "speed")
     assert (converged, missed, feasible) == (0.0, 1.0, 1.0)
     assert 0.0 <= speed <= 10.0
 
@@ -86,14 +86,14 @@ def test_a_deadline_that_is_missed_is_reported_and_bounds_are_kept():
 @pytest.mark.parametrize("window", [5, 12, 40])
 def test_what_a_missed_deadline_leaves_keeps_transitions_and_bounds_before_the_window_is_full(window: int):
     full = _followed(FullBaliseMovingHorizon(window=window, deadline=0.0))
-    assert _told(full, "deadline_missed", "feasible") == [1.0, 1.0]
+    assert _reported(full, "deadline_missed", "feasible") == [1.0, 1.0]
 
 
 def test_a_deadline_before_the_first_row_gives_the_prediction():
     system = FullBaliseMovingHorizon(window=3, deadline=0.0)
     full = _followed(system)
     assert np.isfinite(full.update_outputs()).all()
-    assert _told(full, "last_step", "passes_used", "deadline_missed", "stopped_early") == [0.0, 0.0, 1.0, 0.0]
+    assert _reported(full, "last_step", "passes_used", "deadline_missed", "stopped_early") == [0.0, 0.0, 1.0, 0.0]
     warned = {s.name for s in system.outputs if s.warning}
     assert warned == {
         "bounds_contradicted",
@@ -107,7 +107,7 @@ def test_a_deadline_before_the_first_row_gives_the_prediction():
 
 def test_a_search_that_ends_before_its_tolerance_is_reported():
     full = _followed(FullBaliseMovingHorizon(window=4, tolerance=1e-300, max_iterations=1))
-    assert _told(full, "converged", "deadline_missed", "stopped_early") == [0.0, 0.0, 1.0]
+    assert _reported(full, "converged", "deadline_missed", "stopped_early") == [0.0, 0.0, 1.0]
 
 
 def test_a_restored_block_repeats_its_steps():

@@ -66,12 +66,12 @@ def _filtered(rows):
     """The Kalman filter in its textbook form."""
     x, P = START, SPREAD
     for row in rows:
-        told = LAYOUT.unpacked(row)
-        moved = _moved(x, told, None)
+        reported = LAYOUT.unpacked(row)
+        moved = _moved(x, reported, None)
         x, P = moved.state, moved.F @ P @ moved.F.T + moved.noise
-        for j in np.flatnonzero(told.used):
+        for j in np.flatnonzero(reported.used):
             gain = P @ SEES[j] / (SEES[j] @ P @ SEES[j] + READ[j, j])
-            x, P = x + gain * (told.measured[j] - SEES[j] @ x), P - np.outer(gain, SEES[j] @ P)
+            x, P = x + gain * (reported.measured[j] - SEES[j] @ x), P - np.outer(gain, SEES[j] @ P)
     return x, P
 
 
@@ -82,14 +82,14 @@ def _stacked(rows):
     now, at = np.hstack([np.linalg.cholesky(SPREAD), np.zeros((2, count))]), START
     residuals, right = [np.eye(2 + count)], [np.zeros(2 + count)]
     for k, row in enumerate(rows):
-        told = LAYOUT.unpacked(row)
-        moved = _moved(at, told, None)
+        reported = LAYOUT.unpacked(row)
+        moved = _moved(at, reported, None)
         now, at = moved.F @ now, moved.state
         now[:, 2 + k] = np.sqrt(moved.noise.diagonal())
         S[k], s[k] = now, at
-        for j in np.flatnonzero(told.used):
+        for j in np.flatnonzero(reported.used):
             residuals.append((now[j] / np.sqrt(READ[j, j]))[None])
-            right.append(np.array([(told.measured[j] - at[j]) / np.sqrt(READ[j, j])]))
+            right.append(np.array([(reported.measured[j] - at[j]) / np.sqrt(READ[j, j])]))
     return np.vstack(residuals), np.hstack(right), S, s
 
 
@@ -215,13 +215,13 @@ def test_a_factor_graph_of_others_comes_to_an_equal_result():
     graph = gtsam.GaussianFactorGraph()
     graph.add(gtsam.JacobianFactor(0, np.eye(2), START, gtsam.noiseModel.Gaussian.Covariance(SPREAD)))
     for k, row in enumerate(rows):
-        told = LAYOUT.unpacked(row)
-        moved = _shaken(START, told, None)
+        reported = LAYOUT.unpacked(row)
+        moved = _shaken(START, reported, None)
         noise = gtsam.noiseModel.Gaussian.Covariance(moved.noise)
         graph.add(gtsam.JacobianFactor(k, -moved.F, k + 1, np.eye(2), moved.state - moved.F @ START, noise))
-        for j in np.flatnonzero(told.used):
+        for j in np.flatnonzero(reported.used):
             read = gtsam.noiseModel.Isotropic.Sigma(1, float(np.sqrt(READ[j, j])))
-            graph.add(gtsam.JacobianFactor(k + 1, SEES[j : j + 1], told.measured[j : j + 1], read))
+            graph.add(gtsam.JacobianFactor(k + 1, SEES[j : j + 1], reported.measured[j : j + 1], read))
     smoothed = graph.optimize()
     found = _solve(problem, rows)
     wanted = np.array([smoothed.at(k + 1) for k in range(len(rows))])

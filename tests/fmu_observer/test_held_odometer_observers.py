@@ -118,10 +118,10 @@ def test_the_equations_are_those_of_the_thesis(make: Any, preset: str) -> None:
         largest = [K] if make is DiscreteMeasurementObserver else [gain(0.0), gain(float(p.speed_max))]
         sizes = np.sqrt(np.diag(P)) @ (p.unknown_acceleration, p.unknown_jerk, p.unknown_jerk_rate)
         reading = max(np.sqrt(k @ P @ k) for k in largest) * (1.7 * t + p.odometer_error)
-        told = min(np.sqrt(np.linalg.inv(P)[0, 0]) * W, abs(20.0 - v) + p.odometer_error + 1.7 * t)
+        reported = min(np.sqrt(np.linalg.inv(P)[0, 0]) * W, abs(20.0 - v) + p.odometer_error + 1.7 * t)
         r = 20.0 - v
         slowing = [effort / p.mass - drag - d + K[0] * r, rate + K[1] * r, K[2] * r]
-        return [v, *slowing, reading + sizes - p.bound_decay * W, told]
+        return [v, *slowing, reading + sizes - p.bound_decay * W, reported]
 
     expected = solve_ivp(flow, (0.0, 0.15), [0.0, 20.4, 0.2, -0.03, level, 0.0], rtol=1e-11, atol=1e-13).y[:, -1]
     runner.runtime.advance(0.15)
@@ -210,9 +210,9 @@ def test_a_prediction_goes_on_by_a_disturbance_whose_rate_decays(make: Any) -> N
 
     def rate(s: float, W: np.ndarray) -> np.ndarray:
         speed = v0 - 0.3 * s + 0.2 * (s - (1.0 - np.exp(-s)))
-        told = min(np.sqrt(np.linalg.inv(P)[0, 0]) * W[0], abs(40.0 - speed) + 1.7 * (s + 0.2))
+        reported = min(np.sqrt(np.linalg.inv(P)[0, 0]) * W[0], abs(40.0 - speed) + 1.7 * (s + 0.2))
         own = np.sqrt(P[2, 2]) * 0.2 * np.exp(-s)
-        return np.array([gain * told + sizes + own - p.bound_decay * W[0]])
+        return np.array([gain * reported + sizes + own - p.bound_decay * W[0]])
 
     expected = solve_ivp(rate, (0.0, 34.8), [level0], t_eval=instants, rtol=1e-10, atol=1e-12).y[0]
     np.testing.assert_allclose(levels, expected, rtol=1e-6)
@@ -244,8 +244,8 @@ def test_a_disturbance_that_brakes_never_pushes_back(make: Any) -> None:
     gain = np.sqrt(np.asarray(p.gain) @ P @ np.asarray(p.gain))
 
     def rate(t: float, W: np.ndarray) -> np.ndarray:
-        told = min(np.sqrt(np.linalg.inv(P)[0, 0]) * W[0], 3.0 + 1.7 * t)
-        return np.array([gain * told + np.sqrt(P[0, 0]) * 1.0 - p.bound_decay * W[0]])
+        reported = min(np.sqrt(np.linalg.inv(P)[0, 0]) * W[0], 3.0 + 1.7 * t)
+        return np.array([gain * reported + np.sqrt(P[0, 0]) * 1.0 - p.bound_decay * W[0]])
 
     runner.runtime.advance(1.0)
     assert runner.outputs()["speed"] == 0.0
@@ -299,16 +299,16 @@ def test_a_standstill_ends_what_is_carried(make: Any) -> None:
     runner.runtime.x[1] = 10.0
     runner.set("u", {"odometer": 10.0})
     runner.runtime.start(0.0)
-    told = []
+    reported = []
     for k in range(1, 2000):
         t = 0.01 * k
         runner.set("u", {"odometer": v(t)})
         runner.runtime.advance(t)
         out = runner.outputs()
         error = abs(out["speed"] - v(t))
-        told.append((error - 1e-9) / max(out["error_bound"], 1e-12))
-    assert max(told) <= 1.0
-    assert max(told[:990]) > 0.1
+        reported.append((error - 1e-9) / max(out["error_bound"], 1e-12))
+    assert max(reported) <= 1.0
+    assert max(reported[:990]) > 0.1
 
 
 def test_the_position_bound_starts_anew_at_a_balise() -> None:

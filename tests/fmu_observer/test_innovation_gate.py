@@ -27,14 +27,14 @@ from fmu_observer.observers.innovation_gate import (
     GateMemory,
     ReportedPlace,
     _gate_limit,
-    _GateJudgement,
-    judge,
+    _GateVerdict,
+    evaluate,
 )
 from plant_models.hybrid import NumpyKernel, Runtime, scalar_names
 from plant_models.hybrid.event import DOUBTED, IGNORED, USED
 
 MOTION, GAP = SteadyMotion(speed=14.0), 0.3
-TOLD_BY_PACKETS = "predicted_output[2]"  # a speed of which no packet comes here
+NOTIFIED_BY_PACKETS = "predicted_output[2]"  # a speed of which no packet comes here
 GENERIC = (ExponentialGain, HeldInnovation, HybridImpulsive, OutputPredictor)
 # one of each is traced once; an observer of this room may do without a gate
 TRAIN = [OBSERVERS[name] for name in OBSERVERS if OBSERVERS.room(name).endswith(".train")]
@@ -52,14 +52,14 @@ def own_count(system: GatedObserver) -> int:
     return scalar_names(system.states).index(GATE_MEMORY[0].name)
 
 
-def bench_of(make: Callable[[], GatedObserver], gate: float = REJECT, **parameters: float) -> SystemRunner:
+def gated_of(make: Callable[[], GatedObserver], gate: float = REJECT, **parameters: float) -> SystemRunner:
     """An observer that believes the steady motion, and whose gate has settled."""
     system = make()
     runner = SystemRunner(system, preset=PRESETS.get(system.name), gate=gate, **parameters)
     names = scalar_names(system.states)
     v, inputs = MOTION.speed, scalar_names(system.input_signals)
     exact = {"estimated_speed": v, "wheel_rate": v / 0.575, "wheel_speed_estimate": v, "odometer_speed": v}
-    exact |= {TOLD_BY_PACKETS: v}
+    exact |= {NOTIFIED_BY_PACKETS: v}
     exact |= {"adhesion_deceleration": -(0.575**2) / 225.0 * MOTION.effort(0.0)}
     runner.set("x", {name: value for name, value in exact.items() if name in names})
     fed = {
@@ -111,12 +111,12 @@ SETTLED = BLANK._replace(settled=2.0, recent=0.4, share=0.005, reference=60.0, l
 SINCE = float(np.hypot(0.8, 3.0 * 0.005 * 40.0))
 """What the balise at 60 m left, and three times the recent share of the way since [m]."""
 LIMIT = 0.5 + 0.2 + SINCE + 3.0 * 0.4
-"""Of `SETTLED` and `judged`: floor, accuracy, the way since 60 m, and of the recent innovation [m]."""
+"""Of `SETTLED` and `evaluated`: floor, accuracy, the way since 60 m, and of the recent innovation [m]."""
 
 
-def judged(innovation: float, before: GateMemory = SETTLED, **told: Any) -> _GateJudgement:
+def evaluated(innovation: float, before: GateMemory = SETTLED, **reported: Any) -> _GateVerdict:
     """The judgement on a position so far from an estimate of 100 m."""
-    return judge(before, ReportedPlace(100.0 - innovation, 0.2, 100.0, 0.3, 0.0, 10.0)._replace(**told), GATE)
+    return evaluate(before, ReportedPlace(100.0 - innovation, 0.2, 100.0, 0.3, 0.0, 10.0)._replace(**reported), GATE)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -127,24 +127,24 @@ def test_the_limit_is_the_sum_of_its_terms(sign: float) -> None:
         (LIMIT - 0.2, {"accuracy": float("nan")}),
         (LIMIT - SINCE + 7.0, {"bound": 7.0}),  # the larger of both
     ]
-    for limit, told in cases:
-        assert [float(judged(sign * (limit + beyond), **told).used) for beyond in (-1e-9, 1e-9)] == [1.0, 0.0]
+    for limit, reported in cases:
+        assert [float(evaluated(sign * (limit + beyond), **reported).used) for beyond in (-1e-9, 1e-9)] == [1.0, 0.0]
 
 
 @pytest.mark.parametrize(("share", "granted"), [(0.0, 0.01), (0.005, 0.015), (0.1, 0.05)])
 def test_the_share_of_the_way_is_learnt_within_creep_and_drift(share: float, granted: float) -> None:
     before = SETTLED._replace(share=share, left=0.0, recent=0.0)
-    told = ReportedPlace(0.0, 0.0, 100.0, 0.0, 10.0, 10.0)
+    reported = ReportedPlace(0.0, 0.0, 100.0, 0.0, 10.0, 10.0)
     for change, floor in ((0.0, 0.01), (0.15, 0.03), (-0.15, 0.03), (1.0, 0.05)):  # of the speed [m/s2]
-        limit = float(_gate_limit(before._replace(last_odometer=10.0 + 10.0 * change), told, GATE))
+        limit = float(_gate_limit(before._replace(last_odometer=10.0 + 10.0 * change), reported, GATE))
         assert limit == pytest.approx(0.5 + max(granted, floor) * 40.0)
-    assert float(_gate_limit(before, told._replace(odometer=None), GATE)) == pytest.approx(0.5 + 0.05 * 40.0)
+    assert float(_gate_limit(before, reported._replace(odometer=None), GATE)) == pytest.approx(0.5 + 0.05 * 40.0)
 
 
 def test_what_is_remembered_of_a_telegram() -> None:
     """One within the limit, a larger one within it, one that is refused, one beyond it before the gate has settled."""
     unsettled = SETTLED._replace(settled=1.0)
-    kept = [judged(0.1), judged(1.0), judged(50.0), judged(50.0, unsettled)]
+    kept = [evaluated(0.1), evaluated(1.0), evaluated(50.0), evaluated(50.0, unsettled)]
     assert [float(j.used) for j in kept] == [1.0, 1.0, 0.0, 1.0]
     assert [float(j.memory.settled) for j in kept] == [3.0, 3.0, 2.0, 0.0]
     # halved, unless what this one is off beyond its accuracy is larger
@@ -163,7 +163,7 @@ def test_the_weight_is_the_ratio_of_two_kalman_gains(accuracies: list[float], bo
     """One at the floor and below it, then falling: against gains of ``correct`` with variances of rectangles."""
     a, b = sorted(accuracies)
     before = SETTLED._replace(left=0.0, share=0.0, recent=0.0, reference=100.0)
-    weights = [float(judged(0.0, before, accuracy=q, bound=bound).weight) for q in (0.0, a, b)]
+    weights = [float(evaluated(0.0, before, accuracy=q, bound=bound).weight) for q in (0.0, a, b)]
     assert weights == sorted(weights, reverse=True)
     assert weights[0] == 1.0
 
@@ -177,7 +177,7 @@ def test_the_weight_is_the_ratio_of_two_kalman_gains(accuracies: list[float], bo
 
 
 @pytest.mark.parametrize(
-    ("told", "count"),
+    ("reported", "count"),
     [
         # the way of the odometer, its mean of 10 and 30 m/s
         ({"estimate": 100.0, "position": 220.0, "odometer": 30.0, "t": 11.0}, 2.0),
@@ -189,11 +189,11 @@ def test_the_weight_is_the_ratio_of_two_kalman_gains(accuracies: list[float], bo
         ({"estimate": 100.0, "position": 310.0, "odometer": 90.0, "t": 14.0}, 1.0),
     ],
 )
-def test_doubted_telegrams_agree_by_ways_or_speeds(told: dict[str, float], count: float) -> None:
+def test_doubted_telegrams_agree_by_ways_or_speeds(reported: dict[str, float], count: float) -> None:
     before = SETTLED._replace(last_position=60.0, last_odometer=90.0)
-    first = judged(-100.0, before, odometer=10.0).memory
+    first = evaluated(-100.0, before, odometer=10.0).memory
     assert (float(first.doubted), float(first.last_speed)) == (1.0, 14.0)
-    second = judge(first, ReportedPlace(accuracy=0.2, bound=0.3, **told), GATE)
+    second = evaluate(first, ReportedPlace(accuracy=0.2, bound=0.3, **reported), GATE)
     believed = count == 2.0
     assert (float(second.restart), float(second.used)) == (believed, believed)
     assert float(second.memory.doubted) == (0.0 if believed else count)
@@ -203,13 +203,13 @@ def test_the_way_of_the_odometer_since_the_last_one_speaks_for_a_telegram_at_onc
     """Mean of 12 and 16 m/s for 10 s from 60 m on: 200 m, while the estimate has stayed behind at 100 m."""
     before = SETTLED._replace(last_position=60.0, last_odometer=12.0)
     for odometer, used in ((16.0, 1.0), (60.0, 0.0)):
-        assert float(judged(-100.0, before, odometer=odometer).restart) == used
+        assert float(evaluated(-100.0, before, odometer=odometer).restart) == used
 
 
 def test_an_odometer_that_agrees_with_both_says_nothing_against_the_estimate() -> None:
     """4 m/s for 10 s from 60 m on: 100 m as estimated; 104 m are told, within 5 % of the way and the places."""
     before = SETTLED._replace(last_position=60.0, last_odometer=4.0, recent=0.0)
-    found = judged(-2.6, before, odometer=4.0)
+    found = evaluated(-2.6, before, odometer=4.0)
     assert (float(found.used), float(found.memory.doubted)) == (0.0, 1.0)
 
 
@@ -233,7 +233,7 @@ def test_no_gate_stays_shut(seed: int, accuracy: float) -> None:
         place, t, speed = place + spacing, t + spacing / (0.5 * (speed + new)), new
         off = float(rng.uniform(-1.0, 1.0)) * (accuracy + 0.5)
         estimate, odometer = float(rng.normal() * 1e4), float(rng.uniform(0.0, 60.0))
-        found = judge(memory, ReportedPlace(place + off, accuracy, estimate, 0.0, odometer, t), GATE)
+        found = evaluate(memory, ReportedPlace(place + off, accuracy, estimate, 0.0, odometer, t), GATE)
         memory, shut = found.memory, 0 if float(found.used) > 0.0 else shut + 1
         assert shut <= 2 or number == shut - 1 == 2
 
@@ -243,19 +243,19 @@ def test_no_gate_stays_shut(seed: int, accuracy: float) -> None:
 
 
 def test_every_observer_of_balises_has_the_gate() -> None:
-    told = {name: OBSERVERS[name]() for name in OBSERVERS}
-    told = {n: s for n, s in told.items() if any(e.name == "balise" for e in s.triggered_events)}
+    reported = {name: OBSERVERS[name]() for name in OBSERVERS}
+    reported = {n: s for n, s in reported.items() if any(e.name == "balise" for e in s.triggered_events)}
     # a detector judges telegrams by its own residuals
-    told = {n: s for n, s in told.items() if not type(s).__module__.startswith("fmu_observer.detection.")}
-    assert len(told) >= len(SYSTEMS)
-    for name, system in told.items():
+    reported = {n: s for n, s in reported.items() if not type(s).__module__.startswith("fmu_observer.detection.")}
+    assert len(reported) >= len(SYSTEMS)
+    for name, system in reported.items():
         assert isinstance(system, GatedObserver), name
         assert system.gated
 
 
 @every
 def test_false_telegrams_are_ignored_and_change_nothing(make: Callable[[], GatedObserver]) -> None:
-    false, alone = bench_of(make), bench_of(make)
+    false, alone = gated_of(make), gated_of(make)
     own = own_count(make())
     for offset in (2.0, -2.0, 100.0, -1000.0):
         assert run(false, 1, {0: offset}) == [IGNORED]
@@ -267,7 +267,7 @@ def test_false_telegrams_are_ignored_and_change_nothing(make: Callable[[], Gated
 
 @every
 def test_warned_of_false_telegrams_are_used_as_with_the_gate_off(make: Callable[[], GatedObserver]) -> None:
-    runners = {name: bench_of(make, gate) for name, gate in GATES.items() if name != "reject"}
+    runners = {name: gated_of(make, gate) for name, gate in GATES.items() if name != "reject"}
     verdicts = {name: run(runner, 1, {0: 30.0}) for name, runner in runners.items()}
     assert verdicts == {"off": [USED], "warn": [DOUBTED]}
     own = own_count(make())
@@ -282,7 +282,7 @@ def test_without_false_telegrams_the_gate_changes_no_bit(make: Callable[[], Gate
     noise = dict(enumerate(np.random.default_rng(seed).uniform(-0.05, 0.05, 12).tolist()))
     ends = []
     for gate in GATES.values():
-        runner = bench_of(make, gate)
+        runner = gated_of(make, gate)
         assert run(runner, 12, noise) == [USED] * 12
         ends.append(runner.runtime.x[:own].copy())
     np.testing.assert_array_equal(ends[0], ends[1])
@@ -291,7 +291,7 @@ def test_without_false_telegrams_the_gate_changes_no_bit(make: Callable[[], Gate
 
 @every
 def test_a_wrong_estimate_recovers_from_telegrams_that_agree(make: Callable[[], GatedObserver]) -> None:
-    runner = bench_of(make)
+    runner = gated_of(make)
     off = dict.fromkeys(range(12), 50.0)  # the train is 50 m further than believed
     assert run(runner, 2, off) == [IGNORED, DOUBTED]  # the second is believed, and the estimate restarts there
     assert error(runner, 50.0) < 0.5
@@ -301,13 +301,13 @@ def test_a_wrong_estimate_recovers_from_telegrams_that_agree(make: Callable[[], 
 
 @every
 def test_false_telegrams_that_do_not_agree_are_never_believed(make: Callable[[], GatedObserver]) -> None:
-    runner = bench_of(make)
+    runner = gated_of(make)
     assert run(runner, 6, {k: 40.0 * (-1) ** k * (k + 1) for k in range(6)}) == [IGNORED] * 6
 
 
 @every
 def test_a_false_telegram_delivered_twice_is_one(make: Callable[[], GatedObserver]) -> None:
-    runner = bench_of(make)
+    runner = gated_of(make)
     run(runner, 1, {0: 40.0})
     assert [runner.runtime.trigger("balise") for _ in range(5)] == [IGNORED] * 5
 
@@ -320,7 +320,7 @@ def test_a_start_50_m_off_is_no_reason_to_doubt(name: str) -> None:
         runner = SystemRunner(system, preset=PRESETS.get(name), gate=gate)
         fed = {"effort": effort_for(system), "odometer": MOTION.speed}
         runner.set("u", {n: value for n, value in fed.items() if n in scalar_names(system.input_signals)})
-        runner.set("x", dict.fromkeys({TOLD_BY_PACKETS} & set(scalar_names(system.states)), MOTION.speed))
+        runner.set("x", dict.fromkeys({NOTIFIED_BY_PACKETS} & set(scalar_names(system.states)), MOTION.speed))
         runner.runtime.x[:2] = -50.0, MOTION.speed
         runner.runtime.start(0.0)
         assert run(runner, 30) == [USED] * 30
@@ -330,7 +330,7 @@ def test_a_start_50_m_off_is_no_reason_to_doubt(name: str) -> None:
 
 def test_the_location_accuracy_widens_the_gate() -> None:
     for accuracy, expected in ((0.0, IGNORED), (10.0, USED)):
-        runner = bench_of(MAKERS["differentiator_cdo"])
+        runner = gated_of(MAKERS["differentiator_cdo"])
         runner.set("u", {"balise_location_accuracy": accuracy})
         assert run(runner, 1, {0: 8.0}) == [expected]
 
@@ -351,7 +351,7 @@ def test_a_balise_that_does_not_act_is_not_evaluated() -> None:
 @every
 def test_python_and_traced_code_evaluate_alike(make: Callable[[], GatedObserver]) -> None:
     offsets = {1: 3.0, 3: -200.0, 5: 60.0, 6: 60.0, 7: 60.0, 9: 0.3}
-    traced, python = (bench_of(make, internal_step=0.03) for _ in range(2))  # few steps: NumPy is slow
+    traced, python = (gated_of(make, internal_step=0.03) for _ in range(2))  # few steps: NumPy is slow
     python.runtime = _in_python(python)
     assert run(traced, 12, offsets) == run(python, 12, offsets)
     assert np.isfinite(traced.runtime.x).all()

@@ -39,9 +39,9 @@ ARMED = RuleMemory(TRUSTED, 0.0, 0.0, 9.0, 0.0, 20.0, 9.0, 0.0, 99.0, -99.0, 0.0
 THETA = 0.9 / 2.3
 
 
-def after(before: Any, judged: Any) -> Any:
+def after(before: Any, evaluated: Any) -> Any:
     """A judgement whose memory is all of it."""
-    return judged._replace(memory=before._replace(**judged.memory))
+    return evaluated._replace(memory=before._replace(**evaluated.memory))
 
 
 def printed(readings: list[float], speed: float, p: Any = PRINTED) -> list[tuple[float, float]]:
@@ -55,8 +55,8 @@ def printed(readings: list[float], speed: float, p: Any = PRINTED) -> list[tuple
 
 
 def repaired(before: Any, y: float, speed: float, effort: float = -1.0, p: Any = P) -> Any:
-    told = Reading(y, speed, p.residual_gain * (y - speed), effort)
-    return after(before, RepairedRules().at_sample(before, told, p))
+    reported = Reading(y, speed, p.residual_gain * (y - speed), effort)
+    return after(before, RepairedRules().at_sample(before, reported, p))
 
 
 # -- printed
@@ -70,8 +70,8 @@ def test_the_printed_rules_take_effect_a_sample_late() -> None:
 
 def test_without_the_delay_they_take_effect_at_the_sample_that_shows_it() -> None:
     at_once = SimpleNamespace(**SHARED, rule_4=0.0, rule_delay=0.0)
-    told = printed([20.0, 19.0, 18.9, 19.9, 19.8, 19.7], 20.0, at_once)
-    assert told == [(0, 0), (1, 0), (1, 0), (1, 1), (0, 0), (0, 0)]
+    reported = printed([20.0, 19.0, 18.9, 19.9, 19.8, 19.7], 20.0, at_once)
+    assert reported == [(0, 0), (1, 0), (1, 0), (1, 1), (0, 0), (0, 0)]
 
 
 def test_the_printed_fault_stays_for_ever_where_the_reading_only_falls() -> None:
@@ -85,8 +85,8 @@ def test_rule_4_calls_a_rise_a_fault_and_rule_5_a_standing_wheel() -> None:
     assert (1.0, 1.0) not in printed(rising, 19.9)
     assert (1.0, 1.0) in printed(rising, 19.9, SimpleNamespace(**SHARED, rule_4=1.0, rule_delay=1.0))
     memory = PrintedMemory(1.0, 1.0, 1.0, 1.0, 0.5, 9.0)  # rule 3 and rule 5 at once: the later one counts
-    judged = _PrintedRules().at_sample(memory, Reading(0.0, 0.1, -0.2, -1.0), PRINTED)
-    assert judged.memory["next_fault_state"] == 1.0
+    evaluated = _PrintedRules().at_sample(memory, Reading(0.0, 0.1, -0.2, -1.0), PRINTED)
+    assert evaluated.memory["next_fault_state"] == 1.0
 
 
 def test_the_printed_rules_know_no_balises() -> None:
@@ -100,9 +100,9 @@ def test_the_printed_rules_know_no_balises() -> None:
 
 def test_a_fault_begins_at_the_sample_that_shows_it() -> None:
     for gap, expected in ((THETA - 1e-6, TRUSTED), (THETA + 1e-6, HELD)):
-        judged = repaired(ARMED, 20.0 - gap, 20.0)
-        assert judged.memory.odometer_mode == expected
-        assert judged.onset == (expected == HELD)
+        evaluated = repaired(ARMED, 20.0 - gap, 20.0)
+        assert evaluated.memory.odometer_mode == expected
+        assert evaluated.onset == (expected == HELD)
 
 
 def until(memory: Any, mode: float, y: float, speed: float, effort: float, p: Any = P) -> int:
@@ -123,8 +123,8 @@ def test_faults_of_both_signs_begin_and_those_against_the_effort_are_short(
 ) -> None:
     """1.2 s of what the effort does not cause, 15 s of what it does; then the odometer is followed, and not trusted."""
     armed = ARMED._replace(effort_time=99.0 * effort)
-    judged = repaired(armed, 20.0 + offset, 20.0, effort)
-    assert (judged.memory.odometer_mode, judged.onset, judged.restart) == (HELD, 1.0, 0.0)
+    evaluated = repaired(armed, 20.0 + offset, 20.0, effort)
+    assert (evaluated.memory.odometer_mode, evaluated.onset, evaluated.restart) == (HELD, 1.0, 0.0)
     assert until(armed, UNCONFIRMED, 20.0 + offset, 20.0, effort) == lasting + 1
     without = SimpleNamespace(**{**vars(P), "sign_rule": 0.0})
     assert until(armed, UNCONFIRMED, 20.0 + offset, 20.0, effort, without) == 76
@@ -144,8 +144,8 @@ def test_an_odometer_that_is_not_proven_is_held_to_lie_for_a_second(offset: floa
     assert until(young, UNCONFIRMED, 20.0 + offset, 20.0, 0.0) == 7
     assert until(young._replace(proven_time=8.0), UNCONFIRMED, 20.0 + offset, 20.0, 0.0) == 11
     last = repaired(young, 20.0 + offset, 20.0, 0.0).memory._replace(hold_time=1.0)
-    judged = repaired(last, 20.0 + offset, 20.0, 0.0)
-    assert (judged.restart, judged.withdrawn) == (1.0, 1.0)
+    evaluated = repaired(last, 20.0 + offset, 20.0, 0.0)
+    assert (evaluated.restart, evaluated.withdrawn) == (1.0, 1.0)
     proven = repaired(last._replace(proven_time=20.0, hold_time=14.8), 20.0 + offset, 20.0, 0.0)
     assert (proven.restart, proven.withdrawn) == (1.0, 0.0)
 
@@ -203,18 +203,18 @@ def test_a_wheel_that_jumps_does_not_roll() -> None:
 
 def test_one_sample_too_fast_while_braking_moves_nothing() -> None:
     """A reading 20 % too high for 0.2 s is kept out, and the wheel is believed again at the second rolling sample."""
-    memory, told = ARMED, []
+    memory, reported = ARMED, []
     for y in (24.0, 19.8, 19.6):
-        judged = repaired(memory, y, 20.0)
-        memory = judged.memory
-        told.append((memory.odometer_mode, float(judged.restart)))
-    assert told == [(HELD, 0.0), (HELD, 0.0), (TRUSTED, 1.0)]
+        evaluated = repaired(memory, y, 20.0)
+        memory = evaluated.memory
+        reported.append((memory.odometer_mode, float(evaluated.restart)))
+    assert reported == [(HELD, 0.0), (HELD, 0.0), (TRUSTED, 1.0)]
 
 
 @pytest.mark.parametrize("before", [-9.0, 0.0, 0.8])
 def test_a_driven_wheel_that_was_braked_of_late_may_have_jammed(before: float) -> None:
-    judged = repaired(ARMED._replace(effort_time=before), 19.0, 20.0, effort=1.0)
-    assert (judged.memory.odometer_mode, judged.onset, judged.restart) == (HELD, 1.0, 0.0)
+    evaluated = repaired(ARMED._replace(effort_time=before), 19.0, 20.0, effort=1.0)
+    assert (evaluated.memory.odometer_mode, evaluated.onset, evaluated.restart) == (HELD, 1.0, 0.0)
 
 
 def test_a_brake_that_is_released_in_a_jam_believes_nothing() -> None:
@@ -222,29 +222,33 @@ def test_a_brake_that_is_released_in_a_jam_believes_nothing() -> None:
 
     The second reading is a mean of the jam and of what follows it; the wheel is driven, and slower than the estimate.
     """
-    memory, estimate, told = ARMED._replace(last_odometer=22.11), 22.15, []
+    memory, estimate, reported = ARMED._replace(last_odometer=22.11), 22.15, []
     for y, effort in ((14.74, -1307.0), (17.05, 7003.0), (22.11, 14278.0), (21.97, 20538.0)):
-        judged = repaired(memory, y, estimate, effort)
-        memory = judged.memory
-        told.append((memory.odometer_mode, float(judged.restart)))
-    assert told == [(HELD, 0.0), (HELD, 0.0), (HELD, 0.0), (TRUSTED, 1.0)]
+        evaluated = repaired(memory, y, estimate, effort)
+        memory = evaluated.memory
+        reported.append((memory.odometer_mode, float(evaluated.restart)))
+    assert reported == [(HELD, 0.0), (HELD, 0.0), (HELD, 0.0), (TRUSTED, 1.0)]
 
 
 def test_a_wheel_that_is_driven_for_twice_the_release_time_has_not_jammed() -> None:
     """From a second and a period after the change on, slow samples count; as many again, and the estimate gives up."""
-    memory, told = ARMED._replace(odometer_mode=HELD, hold_time=0.2), []
+    memory, reported = ARMED._replace(odometer_mode=HELD, hold_time=0.2), []
     for k in range(11):
         memory = repaired(memory, 19.0 + 0.01 * k, 22.0, effort=1.0).memory
-        told.append((memory.odometer_mode, float(memory.against)))
-    assert told == [*((HELD, float(max(0, k - 5))) for k in range(1, 11)), (UNCONFIRMED, 6.0)]
+        reported.append((memory.odometer_mode, float(memory.against)))
+    assert reported == [*((HELD, float(max(0, k - 5))) for k in range(1, 11)), (UNCONFIRMED, 6.0)]
 
 
 def test_a_hold_ends_at_its_limit_and_is_not_called_healthy() -> None:
-    judged = repaired(ARMED._replace(odometer_mode=HELD, hold_time=P.hold_limit - PERIOD), 5.0, 20.0)
-    memory = judged.memory
-    assert (memory.odometer_mode, judged.restart, memory.faults) == (UNCONFIRMED, 1.0, 1000.0)
+    evaluated = repaired(ARMED._replace(odometer_mode=HELD, hold_time=P.hold_limit - PERIOD), 5.0, 20.0)
+    memory = evaluated.memory
+    assert (memory.odometer_mode, evaluated.restart, memory.faults) == (UNCONFIRMED, 1.0, 1000.0)
     rules = RepairedRules()
-    assert (rules.fault(judged.memory), rules.recovering(judged.memory), rules.discarded(judged.memory)) == (1, 1, 0)
+    assert (rules.fault(evaluated.memory), rules.recovering(evaluated.memory), rules.discarded(evaluated.memory)) == (
+        1,
+        1,
+        0,
+    )
     for _ in range(99):
         memory = repaired(memory, 5.0, 5.0).memory
     assert memory.odometer_mode == UNCONFIRMED
@@ -300,8 +304,8 @@ def test_a_fault_that_is_larger_than_noise_hides_is_seen_at_its_first_sample(
 ) -> None:
     p = SimpleNamespace(**{**vars(P), "threshold": threshold, "odometer_noise": noise})
     for nu in np.linspace(-noise, noise, 9):
-        judged = repaired(ARMED, 20.0 + sign * (certain_fault(p) + 1e-9) + nu, 20.0, p=p)
-        assert judged.memory.odometer_mode == HELD
+        evaluated = repaired(ARMED, 20.0 + sign * (certain_fault(p) + 1e-9) + nu, 20.0, p=p)
+        assert evaluated.memory.odometer_mode == HELD
         assert repaired(ARMED, 20.0 + nu, 20.0, p=p).memory.odometer_mode == TRUSTED
     # At an estimate that was just set to a reading: independent noise of both.
     both = np.sqrt(2.0) * noise
@@ -334,22 +338,22 @@ def passing(way: float, believed: float = 200.0, **changed: float) -> Passing:
     return Passing(5.0, 200.0, way, believed, 0.0, 0.0, 1.0)._replace(**changed)
 
 
-def at_balise(before: Any, told: Passing) -> Any:
-    return after(before, RepairedRules().at_balise(before, told, P))
+def at_balise(before: Any, reported: Passing) -> Any:
+    return after(before, RepairedRules().at_balise(before, reported, P))
 
 
 @pytest.mark.parametrize(("way", "expected"), [(197.1, True), (196.9, False), (202.9, True), (203.1, False)])
 def test_the_way_of_the_odometer_is_right_within_1_m_and_1_percent(way: float, expected: bool) -> None:
     held = ARMED._replace(odometer_mode=HELD)
-    judged = at_balise(held, passing(way))
-    assert (judged.memory.odometer_mode == TRUSTED) == expected
-    assert judged.restart == expected
+    evaluated = at_balise(held, passing(way))
+    assert (evaluated.memory.odometer_mode == TRUSTED) == expected
+    assert evaluated.restart == expected
 
 
 def test_a_refuted_hold_corrects_the_speed_by_its_mean_error_and_halves_the_clock() -> None:
-    judged = at_balise(ARMED._replace(odometer_mode=HELD, hold_time=9.0), passing(180.0, 210.0))
-    assert judged.shift == pytest.approx(-2.0)  # 10 m too far in 5 s
-    assert judged.memory.hold_time == 2.5
+    evaluated = at_balise(ARMED._replace(odometer_mode=HELD, hold_time=9.0), passing(180.0, 210.0))
+    assert evaluated.shift == pytest.approx(-2.0)  # 10 m too far in 5 s
+    assert evaluated.memory.hold_time == 2.5
 
 
 def test_an_odometer_that_is_believed_must_be_refuted_twice() -> None:
@@ -366,9 +370,9 @@ def test_an_odometer_that_is_believed_must_be_refuted_twice() -> None:
 def test_a_way_with_a_change_in_it_says_nothing(changed: dict[str, float]) -> None:
     """No balise before; too short; longer than the mode has been what it is (9 s)."""
     held = ARMED._replace(odometer_mode=HELD, hold_time=3.0)
-    judged = at_balise(held, passing(100.0, **changed))
-    assert judged.memory[:5] == held[:5]
-    assert judged.shift == 0.0
+    evaluated = at_balise(held, passing(100.0, **changed))
+    assert evaluated.memory[:5] == held[:5]
+    assert evaluated.shift == 0.0
 
 
 # -- the theorem
@@ -544,7 +548,7 @@ def test_the_block_reports_a_jam(rules: Any) -> None:
     """An estimate that is exact; a wheel that jams from 10 s to 12 s and rolls again."""
     runtime = Runtime(JamDetector(rules))
     runtime.start(0.0)
-    told = []
+    reported = []
     settled = [s.name for s in runtime.system.outputs].index("settled_time")
     for k in range(1, 100):
         t = k * PERIOD
@@ -552,10 +556,10 @@ def test_the_block_reports_a_jam(rules: Any) -> None:
         y = v * (0.8 if 10.0 <= t - 1e-9 < 12.0 else 1.0)
         runtime.u[:4] = 2.3 * (y - v), y, v, -0.9
         runtime.advance(t)
-        told.append(float(runtime.update_outputs()[0]))
+        reported.append(float(runtime.update_outputs()[0]))
         if k == 40:  # samples from 0 s on, all of them with a residual of zero
             assert runtime.update_outputs()[settled] == pytest.approx(41 * PERIOD)
-    on = PERIOD * (1 + np.flatnonzero(told))
+    on = PERIOD * (1 + np.flatnonzero(reported))
     late = PERIOD if rules == "printed" else 0.0
     assert on[0] == pytest.approx(10.2 + late)
     assert on[-1] == pytest.approx(12.4 if rules == "printed" else 12.2, abs=0.21)

@@ -321,7 +321,7 @@ def test_what_is_no_model_of_a_filter_is_refused() -> None:
 # -------------------------------------------------------------------------------------------------------
 
 
-def told(system: GaussianFilter, readings: Sequence[tuple[float, str, dict[str, float]]], until: float) -> Moving:
+def reported(system: GaussianFilter, readings: Sequence[tuple[float, str, dict[str, float]]], until: float) -> Moving:
     runtime = Runtime(system)
     runtime.start(0.0)
     for stamp, event, payload in readings:
@@ -336,10 +336,10 @@ def told(system: GaussianFilter, readings: Sequence[tuple[float, str, dict[str, 
 def test_measurements_that_arrive_apart_at_one_instant_are_one(kind: type[GaussianFilter]) -> None:
     """With independent noises and a linear measurement."""
     model = system_model(PLANTS["pendulum"](), ["angle", "rate"])
-    together = told(
+    together = reported(
         kind(model, arrival="sample"), [(0.0123, "sample", {"sample_angle": 0.1, "sample_rate": 0.2})], 0.02
     )
-    apart = told(
+    apart = reported(
         kind(model, arrival=["place", "turn"]),
         [(0.0123, "place", {"place_angle": 0.1}), (0.0123, "turn", {"turn_rate": 0.2})],
         0.02,
@@ -354,7 +354,7 @@ def test_measurements_that_arrive_apart_at_one_instant_are_one(kind: type[Gaussi
 def test_a_measurement_that_is_missing_leaves_the_prediction() -> None:
     """Between events the covariance of a linear model is that of the exact transition and noise."""
     system = KalmanFilter(arrival="sample")
-    runtime = told(system, [], 1.0)
+    runtime = reported(system, [], 1.0)
     model: FilterModel = system.model
     known = Known(0.0, np.zeros(1), np.zeros(0))
     F, _ = model.transition_jacobians(np.zeros(2), known, 1.0)
@@ -472,14 +472,14 @@ def test_other_filters_refuse_it_too(system: HybridSystem) -> None:
         runtime.start(0.0)
 
 
-@pytest.mark.parametrize(("P", "told"), [([1.0, 1.0, 1.0, 1.0], 0.0), ([1.0, 2.0, 2.0, 1.0], 1.0)])
-def test_a_covariance_that_becomes_none_later_is_reported(P: list[float], told: float) -> None:
+@pytest.mark.parametrize(("P", "reported"), [([1.0, 1.0, 1.0, 1.0], 0.0), ([1.0, 2.0, 2.0, 1.0], 1.0)])
+def test_a_covariance_that_becomes_none_later_is_reported(P: list[float], reported: float) -> None:
     runtime = Runtime(ExtendedKalmanFilter("pendulum"))
     place = scalar_names(runtime.system.states).index("estimate_covariance[1]")
     runtime.start(0.0)
     runtime.x[place : place + 4] = P
     outputs = dict(zip(scalar_names(runtime.system.outputs), runtime.update_outputs(), strict=True))
-    assert outputs["covariance_not_positive"] == told
+    assert outputs["covariance_not_positive"] == reported
     (warned,) = [s for s in runtime.system.outputs if s.warning is not None]
     assert warned.name == "covariance_not_positive"
 

@@ -29,9 +29,9 @@ def batched(found: Iterable[Any]) -> Iterator[tuple[Any, ...]]:
 
 def bounds_of(name: str) -> dict[str, str]:
     """Outputs that are called bounds of an error, and the output that is in error."""
-    told = {s.name: s.description for s in shipped(name).outputs if "bound" in s.name and s.unit in ("m", "m/s")}
-    assert all(text.startswith(PREFIX) for text in told.values()), f"{name}: of what are these bounds? {told}"
-    return {bound: text.removeprefix(PREFIX).split()[0] for bound, text in told.items()}
+    reported = {s.name: s.description for s in shipped(name).outputs if "bound" in s.name and s.unit in ("m", "m/s")}
+    assert all(text.startswith(PREFIX) for text in reported.values()), f"{name}: of what are these bounds? {reported}"
+    return {bound: text.removeprefix(PREFIX).split()[0] for bound, text in reported.items()}
 
 
 CASES = [(name, preset) for name in OBSERVERS if bounds_of(name) for preset in shipped(name).presets]
@@ -56,8 +56,8 @@ def worst_motion(name: str, preset: str) -> Callable[[float], float]:
 def run(name: str, preset: str, acceleration: Callable[[float], float]) -> dict[str, float]:
     """The largest share that an error takes of each bound, in a run from true estimates of the start."""
     observer: Any = OBSERVERS[name]()
-    told = {"unknown_acceleration": ROUGH, "start_position_error": 0.0}
-    runner = SystemRunner(observer, preset=preset, **told)
+    reported = {"unknown_acceleration": ROUGH, "start_position_error": 0.0}
+    runner = SystemRunner(observer, preset=preset, **reported)
     p = observer.unpack_parameters(runner.runtime.p)
     speed, position = 24.0, 0.0
     runner.runtime.x[1] = speed

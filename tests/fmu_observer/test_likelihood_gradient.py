@@ -24,10 +24,10 @@ def test_value_and_gradient() -> None:
     """Differences of 1e-5 leave 1e-8 of a smooth function, and rounding of 1e-16 / 1e-5."""
     system = OBSERVERS["extended_kalman_filter"](model="pendulum")
     rows = measured()
-    told = AccumulatedOutput(system, rows, NAMES)
-    value, gradient = told(VALUES)
+    reported = AccumulatedOutput(system, rows, NAMES)
+    value, gradient = reported(VALUES)
     moves = 1e-5 * np.diag(VALUES)
-    differences = [(told(VALUES + m)[0] - told(VALUES - m)[0]) / (2.0 * m.sum()) for m in moves]
+    differences = [(reported(VALUES + m)[0] - reported(VALUES - m)[0]) / (2.0 * m.sum()) for m in moves]
     np.testing.assert_allclose(gradient, differences, rtol=1e-6)
 
     runtime = Runtime(system)

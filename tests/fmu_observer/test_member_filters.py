@@ -6,7 +6,7 @@ from generic_runner import sampled_run
 from scipy import stats
 
 from fmu_observer.formulas.filtering import particles
-from fmu_observer.formulas.filtering.covariance_consistency import judge
+from fmu_observer.formulas.filtering.covariance_consistency import evaluate
 from fmu_observer.formulas.filtering.smoothing import extended_pass
 from fmu_observer.models.discrete_model import _zero_order_hold
 from fmu_observer.models.exhibits.pendulum_model import linear_pendulum
@@ -114,7 +114,7 @@ def test_particles_know_two_peaks_where_the_extended_filter_fails() -> None:
         errors["particles"] += float(np.square(np.array(means) - states).mean()) / runs
         nees.append((passed.estimates[:, 0] - states) ** 2 / passed.covariances[:, 0, 0])
     assert errors["particles"] < 0.4 * errors["ekf"], errors
-    assert judge(np.concatenate(nees), 1.0, white=False).verdict == "overconfident"
+    assert evaluate(np.concatenate(nees), 1.0, white=False).verdict == "overconfident"
 
 
 def test_resampling_is_systematic_and_keeps_what_has_weight() -> None:
@@ -154,10 +154,10 @@ def test_as_systems_they_follow_the_kalman_filter(filter_class: type) -> None:
         0.01 * np.eye(1),
         angles[:, None],
     )
-    told = {f"process_covariance[{i + 1}]": float(v) for i, v in enumerate(noise.ravel())}
-    told["measurement_covariance[1]"] = 0.01
+    reported = {f"process_covariance[{i + 1}]": float(v) for i, v in enumerate(noise.ravel())}
+    reported["measurement_covariance[1]"] = 0.01
     system, deviations = filter_class("linear_pendulum", 50), np.sqrt(np.einsum("kii->ki", exact.covariances))[5:]
-    found = np.array([sampled_run(system, torques, angles, 0.1, **told, seed=seed)[5:] for seed in range(9)])
+    found = np.array([sampled_run(system, torques, angles, 0.1, **reported, seed=seed)[5:] for seed in range(9)])
     error = np.abs(found[:, :, :2] - exact.estimates[5:]) / deviations
     assert np.median(error.max(axis=(1, 2))) < 1.5
     assert np.median(error.mean(axis=(1, 2))) < 0.6  # sampling errors of some 20 effective members, carried on

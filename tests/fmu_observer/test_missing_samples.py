@@ -97,7 +97,7 @@ def test_any_samples_may_be_missing(name: str, pattern: list[bool], seed: int) -
     able = {s.name for s in system.input_signals if s.can_be_missing}
     places = [i for i, n in enumerate(names) if n.partition("[")[0] in able]
     runtime.start(0.0)
-    told = 0
+    reported = 0
     for k, lacks in enumerate(pattern):
         gone = lacks & (random.random(len(places)) < 0.8)
         runtime.u[places] = np.where(gone, np.nan, 0.1 * random.normal(size=len(places)))
@@ -105,11 +105,11 @@ def test_any_samples_may_be_missing(name: str, pattern: list[bool], seed: int) -
         for event in system.triggered_events:
             if event.samples:
                 runtime.trigger(event.name)
-                told += int(np.isnan(runtime.u[places]).sum())
+                reported += int(np.isnan(runtime.u[places]).sum())
         assert np.isfinite(runtime.x).all()
         runtime.update_outputs()
         assert np.isfinite(runtime.y).all()
-    assert runtime.x[MISSED_PLACE] >= told * (len(system.triggered_events) == 1)
+    assert runtime.x[MISSED_PLACE] >= reported * (len(system.triggered_events) == 1)
 
 
 # -- against filters that are not ours --------------------------------------------------------------------------------
@@ -142,15 +142,15 @@ def reference(readings: np.ndarray, drive: np.ndarray, Q: np.ndarray, R: np.ndar
     theirs = TheirFilter(3, 2)
     theirs.F, theirs.Q, theirs.x, theirs.P = F, Q, m.start.copy(), np.eye(3)
     B = np.asarray(m.moved(np.zeros(3), np.zeros(0), known._replace(u=np.ones(1)), PERIOD))
-    rows, told = [], 0.0
+    rows, reported = [], 0.0
     for k, y in enumerate(readings):
         if k:
             theirs.x, theirs.P = F @ theirs.x + B * drive[k - 1], F @ theirs.P @ F.T + Q
         there = np.flatnonzero(~np.isnan(y))
         if len(there):
             theirs.update(y[there], R=R[np.ix_(there, there)], H=H[there])
-            told += theirs.log_likelihood
-        rows.append(np.hstack([theirs.x.ravel(), theirs.P.ravel(), told]))
+            reported += theirs.log_likelihood
+        rows.append(np.hstack([theirs.x.ravel(), theirs.P.ravel(), reported]))
     return np.array(rows)
 
 
@@ -199,8 +199,8 @@ def test_members_that_measure_nothing_only_move(name: str) -> None:
     lacking[[names.index("measured_y1"), names.index("measured_y2")]] = np.nan
     after = np.asarray(system.jump_vector("sampling", PERIOD, x, lacking, values))
     before = np.reshape(x[7:37], (10, 3))
-    p, given_u = system.unpack_parameters(system.start_parameters()), system.unpack_inputs(lacking)
-    moved = system._moved(before, PERIOD, given_u, p)  # the one thing that is to happen
+    p, stated_u = system.unpack_parameters(system.start_parameters()), system.unpack_inputs(lacking)
+    moved = system._moved(before, PERIOD, stated_u, p)  # the one thing that is to happen
     np.testing.assert_array_equal(np.reshape(after[7:37], (10, 3)).T, moved)
     assert after[3] == x[3]  # the NIS is that of the last sample
 
@@ -260,8 +260,8 @@ def test_compiled_it_leaves_out_equal_samples(name: str) -> None:
         stamp, until = 0.05 * k + 0.02, 0.05 * (k + 1)
         for event in system.triggered_events:
             if event.samples:
-                told = [s.name for s in event.payload if s.can_be_missing]
-                payload = {n: np.nan if random.random() < 0.4 else 0.1 * random.normal() for n in told}
+                reported = [s.name for s in event.payload if s.can_be_missing]
+                payload = {n: np.nan if random.random() < 0.4 else 0.1 * random.normal() for n in reported}
                 runtime.advance(stamp)
                 for n, value in payload.items():
                     runtime.u[names.index(n)] = value

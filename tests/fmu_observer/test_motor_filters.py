@@ -78,9 +78,9 @@ def test_the_generic_filter_of_the_euler_motor_is_equal() -> None:
     whole = np.zeros(7)
     whole[:4] = p.process_variance
     runtime = Runtime(generic)
-    told = scalar_names(generic.parameter_signals)
-    runtime.p[[told.index(f"process_covariance[{i}]") for i in range(1, 50)]] = np.diag(whole).ravel()
-    runtime.p[[told.index(f"measurement_covariance[{i}]") for i in range(1, 5)]] = np.diag(
+    reported = scalar_names(generic.parameter_signals)
+    runtime.p[[reported.index(f"process_covariance[{i}]") for i in range(1, 50)]] = np.diag(whole).ravel()
+    runtime.p[[reported.index(f"measurement_covariance[{i}]") for i in range(1, 5)]] = np.diag(
         p.measurement_variance
     ).ravel()
     held = scalar_names(generic.states)
@@ -111,8 +111,8 @@ def test_the_jacobians_are_exact(observer: MotorFilter) -> None:
     ] = 0.02
     p, n = observer.unpack_parameters(values), observer.order
     assert p.inductance_q == 0.02
-    at, told = np.array([0.7, 1.3, 90.0, 0.6, 0.03])[:n], drawn_inputs(observer)[7]
-    u = observer.unpack_inputs(told)
+    at, reported = np.array([0.7, 1.3, 90.0, 0.6, 0.03])[:n], drawn_inputs(observer)[7]
+    u = observer.unpack_inputs(reported)
     step = exact_jacobian(lambda x, _: observer.predict(x, u, p)[0], n, 1)
     np.testing.assert_allclose(observer.predict(at, u, p)[1], step(at, np.zeros(1)), rtol=1e-12, atol=1e-15)
     seen = exact_jacobian(lambda x, _: observer.measure(x, u, p)[0], n, 1)
@@ -159,9 +159,9 @@ def test_the_angle_of_the_printed_filter_is_its_speed_added_up() -> None:
     n = observer.order
     variance = rows[:, n + 15]
     assert (np.diff(variance) > 0.0).all()
-    told = [s.name for s in observer.outputs]
-    assert told[:4] == ["current_d", "current_q", "speed", "angle"]
-    assert {"speed_std", "innovation_d", "innovation_q", "nis"} < set(told)
+    reported = [s.name for s in observer.outputs]
+    assert reported[:4] == ["current_d", "current_q", "speed", "angle"]
+    assert {"speed_std", "innovation_d", "innovation_q", "nis"} < set(reported)
 
 
 def test_a_filter_of_turned_currents_is_the_printed_one_at_its_own_angle() -> None:

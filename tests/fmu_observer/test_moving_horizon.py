@@ -136,8 +136,8 @@ def moved_through(
             F, _ = transition(row[1])
             point = F @ x + F[:, 1] * row[3]
         after = (np.asarray(v).ravel() for v in function(arrival, table, points, row, point, 0.0))
-        x, P, arrival, table, points, told = after
-        found.append((x, P.reshape(N, N), points.reshape(window, N), told[-5:]))
+        x, P, arrival, table, points, reported = after
+        found.append((x, P.reshape(N, N), points.reshape(window, N), reported[-5:]))
     return found
 
 
@@ -254,12 +254,12 @@ def test_bounds_give_the_bounded_optimum(seed: int) -> None:
 def test_bounds_of_disturbances_give_the_bounded_optimum(seed: int) -> None:
     """Passes and the search to convergence against SciPy on the same equations."""
     rows = [row for row in rows_of(seed, 12) if row[1] < 3.0]
-    table, points, judged = np.array(rows), np.tile(START, (len(rows), 1)), problem(disturbed=(2,))
-    found = solve(judged, arrival_cost_at(START, P0), table, points, np.zeros(1), 12)
+    table, points, evaluated = np.array(rows), np.tile(START, (len(rows), 1)), problem(disturbed=(2,))
+    found = solve(evaluated, arrival_cost_at(START, P0), table, points, np.zeros(1), 12)
     expected = disturbed_dense(rows)
     scale = np.abs(expected).max()
     assert np.abs(found.estimates - expected).max() <= 1e-9 * scale
-    full = FullSolver(judged).solve(arrival_cost_at(START, P0), table, points, np.zeros(1), Effort(1e-9))
+    full = FullSolver(evaluated).solve(arrival_cost_at(START, P0), table, points, np.zeros(1), Effort(1e-9))
     assert full.converged
     assert np.abs(full.states - expected).max() <= 1e-6 * scale  # PIQP ends at 1e-9 in the units of the problem
 
@@ -494,8 +494,8 @@ def test_bounds_that_most_measurements_contradict_are_reported(loss: Any) -> Non
     for measured in (0.0, 10.0):
         row = WindowRow(1.0, 0.5, 0.0, np.zeros(1), np.full(2, measured), np.ones(2))
         rows, points = np.tile(LAYOUT.packed(row), (4, 1)), np.zeros((4, N))
-        judged = replace(problem((1,)), losses=(loss,) * 2, loss_scale=lambda _shared: 3.0)
-        found = solve(judged, arrival_cost_at(START, 1e-3 * P0), rows, points, np.zeros(1), 3)
+        evaluated = replace(problem((1,)), losses=(loss,) * 2, loss_scale=lambda _shared: 3.0)
+        found = solve(evaluated, arrival_cost_at(START, 1e-3 * P0), rows, points, np.zeros(1), 3)
         counted[measured] = contradicted(found.bounds, found.far, found.broken)[0]
     assert counted == {0.0: 0.0, 10.0: 1.0}
 
@@ -504,10 +504,10 @@ def test_bounds_that_most_measurements_contradict_are_reported(loss: Any) -> Non
 def test_a_bound_against_which_disturbances_bend_the_course_is_reported(loss: Any) -> None:
     """The place, measured well, goes on at 10 m/s while the speed is held at 0.5: disturbances explain every reading,
     each far outside of its own deviation, and no residual is far. (`geman_mcclure` doubts the readings.)"""
-    told = {}
+    reported = {}
     for speed in (0.4, 10.0):
         rows = np.array([[1.0, 0.1, 0.1 * k, 0.0, speed * 0.1 * k, 0.0, 1.0, 0.0] for k in range(1, 9)])
-        judged = replace(
+        evaluated = replace(
             problem((1,)),
             losses=(loss,) * 2,
             loss_scale=lambda _shared: 3.0,
@@ -515,9 +515,9 @@ def test_a_bound_against_which_disturbances_bend_the_course_is_reported(loss: An
             seen=lambda x, _row, _shared: Seen(H @ x, H, 1e-6 * R),
         )
         start = arrival_cost_at(np.array([0.0, 0.4, 0.0]), 1e-6 * P0)
-        found = solve(judged, start, rows, np.tile(START, (8, 1)), np.zeros(1), 8)
-        told[speed] = contradicted(found.bounds, found.far, found.broken)[0]
-    assert told == {0.4: 0.0, 10.0: 1.0}
+        found = solve(evaluated, start, rows, np.tile(START, (8, 1)), np.zeros(1), 8)
+        reported[speed] = contradicted(found.bounds, found.far, found.broken)[0]
+    assert reported == {0.4: 0.0, 10.0: 1.0}
 
 
 def _shaken(x: Any, row: WindowRow, _shared: Any) -> Moved:
@@ -532,12 +532,12 @@ def test_bounds_that_no_course_keeps_are_reported(seed: int, size: float) -> Non
     rows = np.array([row for row in rows_of(seed, 8) if row[1] < 3.0])
     rows[:, 3:] = 0.0
     still = replace(problem((0,), -0.5, 0.5), moved=lambda x, row, _s: Moved(x, np.eye(N) + 0.0 * row.period, 0.0 * P0))
-    told = {}
+    reported = {}
     for start in (size, 0.25):
         known = np.array([start, 0.0, 0.0])
         found = solve(still, arrival_cost_at(known, 0.0 * P0), rows, np.tile(known, (len(rows), 1)), np.zeros(1), 4)
-        told[start] = contradicted(found.bounds, found.far, found.broken)[0]
-    assert told == {size: 1.0, 0.25: 0.0}
+        reported[start] = contradicted(found.bounds, found.far, found.broken)[0]
+    assert reported == {size: 1.0, 0.25: 0.0}
 
 
 def inequalities(rows: np.ndarray, bounded: tuple[int, ...], disturbed: bool) -> tuple[str, np.ndarray]:
@@ -578,8 +578,8 @@ def check_settles(seed: int) -> None:
     status, expected = inequalities(rows, bounded, disturbed)
     if status != "Solved":
         return
-    judged, points = problem(bounded, disturbed=(2,) if disturbed else ()), np.tile(START, (len(rows), 1))
-    found = solve(judged, arrival_cost_at(START, P0), rows, points, np.zeros(1), 60)
+    evaluated, points = problem(bounded, disturbed=(2,) if disturbed else ()), np.tile(START, (len(rows), 1))
+    found = solve(evaluated, arrival_cost_at(START, P0), rows, points, np.zeros(1), 60)
     assert found.moved[0] < 60.0
     assert found.broken[0] <= 1e-4
     assert np.abs(found.estimates - expected).max() <= 2e-5 * max(1.0, np.abs(expected).max())
@@ -609,7 +609,7 @@ def rao(passes: int) -> tuple[float, np.ndarray]:
         slope = 0.5 * (1.0 - x[1] ** 2) / (1.0 + x[1] ** 2) ** 2
         return Moved(ahead(x), np.array([[0.99, 0.2], [-0.1, slope]]), Q)
 
-    judged = replace(
+    evaluated = replace(
         problem(disturbed=(1,)),
         order=2,
         layout=layout,
@@ -618,26 +618,26 @@ def rao(passes: int) -> tuple[float, np.ndarray]:
         losses=("squares",),
         noise_limits=lambda _row, _shared: Limits(np.zeros(1), np.full(1, 1e30)),
     )
-    errors, told = [], []
+    errors, reported = [], []
     rng, x, arrival = np.random.default_rng(1), np.zeros(2), arrival_cost_at(np.zeros(2), np.eye(2))
     points, table = np.zeros((10, 2)), np.zeros((10, layout.width))
     for k in range(40):
         x = ahead(x) + np.array([0.0, abs(rng.normal())]) if k else x
-        arrival = passed(judged, arrival, table[0], points[0], np.zeros(1))
+        arrival = passed(evaluated, arrival, table[0], points[0], np.zeros(1))
         table = np.vstack([table[1:], [float(k > 0), 1.0, k, (C @ x)[0] + 0.1 * rng.normal(), 1.0]])
         points = np.vstack([points[1:], ahead(points[-1]) if k else points[-1]])
-        found = solve(judged, arrival, table, points, np.zeros(1), passes)
+        found = solve(evaluated, arrival, table, points, np.zeros(1), passes)
         points = np.asarray(found.estimates)
         errors.append(points[-1] - x)
-        told.append(unsettled(found.step, found.broken)[0])
-    return float(np.sqrt(np.mean(np.square(errors)))), np.array(told)
+        reported.append(unsettled(found.step, found.broken)[0])
+    return float(np.sqrt(np.mean(np.square(errors)))), np.array(reported)
 
 
 def test_passes_that_are_too_few_are_reported() -> None:
     """Two passes end half as far off again as convergence and more, and say so in most rows; ten in none."""
-    (few, told), (many, none) = rao(2), rao(10)
+    (few, reported), (many, none) = rao(2), rao(10)
     assert few > 1.5 * many
-    assert told.mean() > 0.8
+    assert reported.mean() > 0.8
     assert not none.any()
 
 

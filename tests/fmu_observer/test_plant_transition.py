@@ -100,10 +100,10 @@ def test_a_fast_plant_at_a_slow_period() -> None:
     accurate = KalmanFilter(Fast(), outputs=["y"], period=0.2)
     assert accurate.model.sample_period == 0.2
     assert moved(accurate.model, np.ones(1), 0.2) == pytest.approx(exp(-10.0), rel=1e-6)
-    judged = own_condition(accurate)
-    assert judged.holds
-    assert judged.numbers["transition_error"] < 1e-9
-    assert not judged.remarks
+    evaluated = own_condition(accurate)
+    assert evaluated.holds
+    assert evaluated.numbers["transition_error"] < 1e-9
+    assert not evaluated.remarks
     coarse = own_condition(KalmanFilter(Fast(), outputs=["y"], substeps=4), {"sample_period": 0.2})
     assert not coarse.holds
     assert coarse.numbers["transition_error"] == pytest.approx(0.1767, rel=1e-3)
@@ -142,12 +142,12 @@ def test_a_longer_period_than_the_steps_are_for_is_refused(kind: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given_to", "said"),
+    ("fed_to", "said"),
     [({"period": 0.0}, "a time above 0"), ({"period": "long"}, "a time above 0"), ({"period": 1e4}, "100000 at most")],
 )
-def test_bad_periods_are_refused_in_words(given_to: dict[str, Any], said: str) -> None:
+def test_bad_periods_are_refused_in_words(fed_to: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        KalmanFilter(Fast(), outputs=["y"], **given_to)
+        KalmanFilter(Fast(), outputs=["y"], **fed_to)
 
 
 def test_many_steps_are_a_loop_with_equal_numbers_and_slopes() -> None:

@@ -81,10 +81,10 @@ def test_beta_bounds_the_transition() -> None:
 def test_infeasible_cells_of_table_4_1(m: float, alpha: float) -> None:
     with pytest.raises(
         InfeasibleBounds, match=r"the gain would have to be larger than alpha allows, \(4\.42\)"
-    ) as told:
+    ) as reported:
         design_proposition_4_1(train_vertices([W1]), C, m, alpha)
-    near_alpha, near_m = told.value.nearest_alpha, told.value.nearest_m
-    assert told.value.constraint == "(4.42)"
+    near_alpha, near_m = reported.value.nearest_alpha, reported.value.nearest_m
+    assert reported.value.constraint == "(4.42)"
     assert near_alpha is not None
     assert near_m is not None
     assert near_alpha > alpha
@@ -96,9 +96,9 @@ def test_infeasible_cells_of_table_4_1(m: float, alpha: float) -> None:
 
 
 def test_a_decay_that_stated_gains_do_not_have() -> None:
-    with pytest.raises(InfeasibleBounds, match=r"cannot decay so fast, \(4\.41\)\. Feasible: m = 0\.9921") as told:
+    with pytest.raises(InfeasibleBounds, match=r"cannot decay so fast, \(4\.41\)\. Feasible: m = 0\.9921") as reported:
         design_proposition_4_1(train_vertices([W1]), C, 1.5, gains=(2.94, -5.5, -3.5))
-    assert (told.value.constraint, told.value.nearest_alpha) == ("(4.41)", None)
+    assert (reported.value.constraint, reported.value.nearest_alpha) == ("(4.41)", None)
 
 
 def test_a_mode_that_is_not_measured() -> None:

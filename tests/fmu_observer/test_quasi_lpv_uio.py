@@ -109,13 +109,13 @@ def test_a_skid_does_not_move_it_either() -> None:
     runner = SystemRunner(QuasiLpvUio(), davis_a=0.0, davis_b=0.0, davis_c=0.0)
     runner.set("u", {"effort": 0.5})
     runner.runtime.start(0.0)
-    told = []
+    reported = []
     for k in range(1, 100):
         t = k * PERIOD
         runner.set("u", {"odometer": 0.5 * t * (1.3 if 10.0 <= t - 1e-9 < 12.0 else 1.0)})
         runner.runtime.advance(t)
-        told.append(runner.outputs()["odometer_fault"])
-    assert PERIOD * (1 + np.flatnonzero(told)[[0, -1]]) == pytest.approx([10.2, 12.2], abs=0.21)
+        reported.append(runner.outputs()["odometer_fault"])
+    assert PERIOD * (1 + np.flatnonzero(reported)[[0, -1]]) == pytest.approx([10.2, 12.2], abs=0.21)
     assert runner.outputs()["speed"] == pytest.approx(0.5 * 99 * PERIOD, abs=0.02)
 
 
@@ -139,7 +139,7 @@ def test_the_printed_rules_latch_up_where_the_repaired_ones_recover() -> None:
 
 def test_a_wheel_that_never_rolls_again_is_found_out_by_balises() -> None:
     """Stuck 10 % low from 10 s to 28 s; without a balise the model cannot refuse it for so long."""
-    for spaced, told in ((100.0, 1.0), (1e9, 0.0)):
+    for spaced, reported in ((100.0, 1.0), (1e9, 0.0)):
         runner = brake(QuasiLpvUio(), 10.0, jam := (10.0, 1e3, 0.1), least_speed=0.0)
         passed, faults = np.floor((400.0 - 45.0) / spaced), []
         for k in range(51, 140):
@@ -150,7 +150,7 @@ def test_a_wheel_that_never_rolls_again_is_found_out_by_balises() -> None:
                 passed = place // spaced
                 runner.balise(place)
             faults.append(runner.outputs()["odometer_fault"])
-        assert min(faults) == faults[-1] == told
+        assert min(faults) == faults[-1] == reported
         assert min(faults[:50]) == 1.0
 
 
@@ -208,11 +208,11 @@ def test_the_odometer_alone_lags_by_what_the_jam_took() -> None:
 def test_the_shipped_scenario_finds_the_jam_and_keeps_the_position() -> None:
     """Published: position error 4 m better; independent: 8.7 m against 0.40 m at the balise after the jam."""
     outcome = Scenario.load("jam_odometry").run(warn=lambda _text: None).check()
-    judged, alone = outcome.result.summary["fault_detection"]
-    assert (judged["faults"], judged["missed"], judged["false"]) == (1, 0, 0)
-    assert judged["start_delays"][0] <= 0.2 + 1e-9
-    assert judged["end_delays"][0] <= 0.4 + 1e-9
-    assert max(map(abs, judged["position_errors"])) < 0.6
+    evaluated, alone = outcome.result.summary["fault_detection"]
+    assert (evaluated["faults"], evaluated["missed"], evaluated["false"]) == (1, 0, 0)
+    assert evaluated["start_delays"][0] <= 0.2 + 1e-9
+    assert evaluated["end_delays"][0] <= 0.4 + 1e-9
+    assert max(map(abs, evaluated["position_errors"])) < 0.6
     assert 7.0 < max(map(abs, alone["position_errors"])) < 10.0
 
 

@@ -143,9 +143,11 @@ def residuals(observer: Any, s: np.ndarray, t: np.ndarray, E: np.ndarray, F: np.
         return np.concatenate([moved, observer.state_derivative(now, x[n:], inputs(now, x), p)])
 
     x = solve_ivp(flow, (0.0, t[-1]), start, t_eval=t, rtol=1e-10, atol=1e-12, max_step=t[1]).y.T
-    told = np.array([observer.output_vector(now, row[n:], inputs(now, row), p) for now, row in zip(t, x, strict=True)])
+    reported = np.array(
+        [observer.output_vector(now, row[n:], inputs(now, row), p) for now, row in zip(t, x, strict=True)]
+    )
     names = scalar_names(observer.outputs)
-    return told[:, [names.index(f"residual_{m.name}") for m in model.measurements]]
+    return reported[:, [names.index(f"residual_{m.name}") for m in model.measurements]]
 
 
 def test_the_channel_of_the_proportional_integral_observer() -> None:

@@ -111,9 +111,9 @@ def test_a_sensitivity_that_can_be_had_is_proven() -> None:
 def test_an_attenuation_that_is_too_strong() -> None:
     with pytest.raises(
         InfeasibleResidualDesign, match=r"the attenuation \(3.56\) is too strong.*lambda = 0.1376"
-    ) as told:
+    ) as reported:
         design_robust_residual(chapter_5(0.1), attenuation=0.12)
-    error = told.value
+    error = reported.value
     assert error.nearest_attenuation == pytest.approx(0.1376, rel=SOLVER)
     assert error.nearest_decay is not None
     assert error.nearest_alpha is not None
@@ -123,9 +123,11 @@ def test_an_attenuation_that_is_too_strong() -> None:
 
 
 def test_a_decay_that_the_size_forbids() -> None:
-    with pytest.raises(InfeasibleResidualDesign, match=r"size of the gains \(3.58\) stands against the decay") as told:
+    with pytest.raises(
+        InfeasibleResidualDesign, match=r"size of the gains \(3.58\) stands against the decay"
+    ) as reported:
         design_robust_residual(chapter_5(0.8))
-    error = told.value
+    error = reported.value
     assert error.nearest_alpha is not None
     assert error.nearest_decay is not None
     assert 0.3 < error.nearest_decay < 0.8
@@ -204,9 +206,9 @@ def test_gains_for_the_train_observer() -> None:
     """The same question as `chapter_5`, in the units of M = 3.36. The page on these observers certifies the gains."""
     davis = {"davis_b": 5.7e-3, "davis_c": -2.4e-4, "residual_gain": 3.36}
     values, design = design_quasi_lpv_gains(0.2, alpha=0.2 * (3.36 / 0.3) ** 2, parameters=davis)
-    same = design_robust_residual(chapter_5(0.2))
-    np.testing.assert_allclose(design.gains, same.gains, rtol=1e-6)
-    assert design.attenuation == pytest.approx(same.attenuation * 3.36 / 0.3, rel=1e-6)
+    equal = design_robust_residual(chapter_5(0.2))
+    np.testing.assert_allclose(design.gains, equal.gains, rtol=1e-6)
+    assert design.attenuation == pytest.approx(equal.attenuation * 3.36 / 0.3, rel=1e-6)
     assert values["gain_high"] == tuple(design.gains[1, :, 0])
     heavy = {"mass": 1e5, "davis_b": 570.0, "davis_c": -24.0, "residual_gain": 3.36}
     np.testing.assert_allclose(

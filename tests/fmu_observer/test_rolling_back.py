@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_standstill import DAVIS, LATE, MASS, PERIOD, TRAIN_OBSERVERS, told
+from test_standstill import DAVIS, LATE, MASS, PERIOD, TRAIN_OBSERVERS, reported
 
 from cosim import Scenario
 from fmu_observer import OBSERVERS
@@ -23,7 +23,7 @@ def roll_back(name: str) -> tuple[Any, list[str]]:
     train = {"mass": MASS, "traction_coefficient": 1.0, "brake_coefficient": 1.0, "train_speed": 2.0, **DAVIS}
     s.add("train", model="longitudinal_train", parameters=train | {"gradient": [STEEPNESS] * 4})
     s.add("odometer", model="odometer", parameters={"sample_period": 0.01 if name == "stopping_uio" else PERIOD})
-    s.add(name, observer=name, parameters=told(name) | {k: 2.0 for k in told(name) if "speed" in k})
+    s.add(name, observer=name, parameters=reported(name) | {k: 2.0 for k in reported(name) if "speed" in k})
     s.connect("train.wheel_speed -> odometer.wheel_speed")
     s.connect(*(f"odometer.reading -> {name}.odometer" for one in ("odometer",) if one in inputs))
     s.connect(*(f"odometer.reading -> {one}.packet_speed" for one in (name,) if one == LATE))

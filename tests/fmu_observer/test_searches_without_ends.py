@@ -127,7 +127,7 @@ def test_where_no_theta_is_enough_none_is_found(share: float, exists: bool) -> N
 
 
 @pytest.mark.parametrize(
-    ("module", "proof", "answer", "ask"),
+    ("module", "proof", "response", "ask"),
     [
         (takagi_sugeno_luenberger, "_proven", None, lambda: takagi_sugeno_luenberger._designed_gains(TRAIN, 8.0)),
         (theorem7, "_proven", None, lambda: theorem7.design_theorem7(TRAIN, 2.0, 8.0)),
@@ -136,8 +136,8 @@ def test_where_no_theta_is_enough_none_is_found(share: float, exists: bool) -> N
     ],
 )
 def test_a_design_that_finds_nothing_says_down_to_what(
-    module: Any, proof: str, answer: Any, ask: Callable[[], Any], monkeypatch: pytest.MonkeyPatch
+    module: Any, proof: str, response: Any, ask: Callable[[], Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, proof, lambda *_, **__: answer)
+    monkeypatch.setattr(module, proof, lambda *_, **__: response)
     with pytest.raises(ValueError, match=r"down to (8e-09|0\.008) 1/s"):
         ask()

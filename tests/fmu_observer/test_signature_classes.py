@@ -36,8 +36,8 @@ def waves(frequencies: list[float], sizes: list[float], seed: int = 0) -> np.nda
 
 def classes(seed: int) -> tuple[np.ndarray, list[str]]:
     kinds = {"slow": (0.05, 1.0), "quick": (0.12, 1.0), "large": (0.05, 4.0)}
-    given = [(name, *values) for name, values in kinds.items() for _ in range(12)]
-    return waves([g[1] for g in given], [g[2] for g in given], seed), [g[0] for g in given]
+    stated = [(name, *values) for name, values in kinds.items() for _ in range(12)]
+    return waves([g[1] for g in stated], [g[2] for g in stated], seed), [g[0] for g in stated]
 
 
 def test_a_strip_is_the_distance_of_two_clouds():
@@ -70,9 +70,9 @@ def test_classes_are_distinguished_on_held_out_records():
     found = np.array([*classifier.labels, "undecided"])[classifier.classify(others, strip=0.0).index]
     assert np.mean(found == np.array(truth)) >= 0.97  # one of 36: what lies at the edge of a cloud
     cautious = classifier.classify(others, strip=1.0)
-    told = cautious.index >= 0
-    assert (np.array(classifier.labels)[cautious.index[told]] == np.array(truth)[told]).all()
-    assert told.mean() > 0.5
+    reported = cautious.index >= 0
+    assert (np.array(classifier.labels)[cautious.index[reported]] == np.array(truth)[reported]).all()
+    assert reported.mean() > 0.5
     assert (cautious.score >= 0.0).all()
 
 

@@ -160,8 +160,8 @@ def test_the_median_of_the_cascade_has_the_sign_of_the_second_state() -> None:
     for scaling, eps, expected in (("norm", 1e-3, 294), ("literal", 1.0, 294), ("literal", 1e-3, 286)):
         median = np.median(dynamic_signature(windows, 67, eps, scaling)[0], axis=0)  # type: ignore[arg-type]
         assert ((np.sign(median) == np.sign(grid[1])) & (grid[1] != 0)).sum() == expected
-    told = observer.inverted([windows[:, 5, 1, 4]], observer.start_state(), parameters(observer)).state
-    assert np.abs(told[:2] - grid[:2, 5, 1, 4]).max() < 0.5  # half of a cell, at a node of the table
+    reported = observer.inverted([windows[:, 5, 1, 4]], observer.start_state(), parameters(observer)).state
+    assert np.abs(reported[:2] - grid[:2, 5, 1, 4]).max() < 0.5  # half of a cell, at a node of the table
 
 
 def test_the_culture_is_identified_by_literal_scaling_only() -> None:
@@ -183,9 +183,9 @@ def test_glycerol_and_enzyme_come_back_from_a_clean_window() -> None:
     state = np.array([0.5, 1.6, 0.13])
     measured = [observer.plant.measured(observer.plant.named(x), p) for x in observer.moved(state, 7, p)]
     past = [np.array([m[i] for m in measured]) for i in range(2)]
-    told = observer.inverted(past, observer.start_state(), p)
-    np.testing.assert_allclose(told.state, state, rtol=0.06)  # a 3 x 3 network is bent between its nodes
-    assert told.outside == 0.0
+    reported = observer.inverted(past, observer.start_state(), p)
+    np.testing.assert_allclose(reported.state, state, rtol=0.06)  # a 3 x 3 network is bent between its nodes
+    assert reported.outside == 0.0
 
 
 def test_the_sharpness_of_the_culture_is_that_of_the_smallest_error_under_its_noise() -> None:
@@ -246,8 +246,8 @@ def test_a_third_state_beyond_the_tables_of_the_cascade_is_reported() -> None:
     assert shares[1] > 0.6
 
 
-@pytest.mark.parametrize(("preset", "period", "told"), [("as_published", 0.01, 1.0), ("wide_samples", 0.1, 0.0)])
-def test_a_rate_that_goes_astray_after_long_is_reported(preset: str, period: float, told: float) -> None:
+@pytest.mark.parametrize(("preset", "period", "reported"), [("as_published", 0.01, 1.0), ("wide_samples", 0.1, 0.0)])
+def test_a_rate_that_goes_astray_after_long_is_reported(preset: str, period: float, reported: float) -> None:
     """By the exact solution, without noise; at 8 s less than a third of the windows lay beyond the table."""
     observer = ReactionSignature()
     p = observer.unpack_parameters(observer.start_parameters(preset))
@@ -259,7 +259,7 @@ def test_a_rate_that_goes_astray_after_long_is_reported(preset: str, period: flo
         x = x._replace(**observer.jump("sampling", k * period, x, u, p))
     values = observer.output(6.5, x, u, p)
     assert values["outside_count"] < 0.35 * values["window_count"]
-    assert values["mostly_outside"] == told
+    assert values["mostly_outside"] == reported
 
 
 @pytest.mark.parametrize("deviation", [0.0, 0.001, 0.02])
@@ -271,9 +271,9 @@ def test_the_noise_of_a_signal_is_stated(deviation: float) -> None:
     for k in range(900):
         u = system.unpack_inputs(np.array([np.sin(0.01 * np.pi * k) + deviation * rng.standard_normal()]))
         x = x._replace(**system.jump("sampling", 0.01 * k, x, u, p))
-    told = system.output(9.0, x, u, p)
-    assert abs(told["noise"] - deviation) < 0.3 * deviation + 1e-5
-    assert told["noisy"] == (told["ready"] if deviation > 0.003 else 0.0)
+    reported = system.output(9.0, x, u, p)
+    assert abs(reported["noise"] - deviation) < 0.3 * deviation + 1e-5
+    assert reported["noisy"] == (reported["ready"] if deviation > 0.003 else 0.0)
 
 
 SIGNATURES = sorted(name for name in OBSERVERS if "signature" in name)
@@ -309,7 +309,7 @@ def test_a_parameter_that_a_table_does_not_have_is_refused_or_takes_effect(name:
 
 def _effect(system: HybridSystem, start: object, changed: object) -> bool:
     """Whether outputs after some samples of a moving signal differ."""
-    told = []
+    reported = []
     for p in (start, changed):
         x = system.unpack_states(system.start_state())
         for k in range(12):
@@ -318,8 +318,8 @@ def _effect(system: HybridSystem, start: object, changed: object) -> bool:
                 invalid="ignore", divide="ignore"
             ):  # until the window is full it holds no biomass, and is not looked up
                 x = x._replace(**system.jump(system.events[0].name, 0.0, x, u, p))
-        told.append(np.hstack(list(system.output(0.0, x, u, p).values())))
-    return bool((told[0] != told[1]).any())
+        reported.append(np.hstack(list(system.output(0.0, x, u, p).values())))
+    return bool((reported[0] != reported[1]).any())
 
 
 @pytest.mark.parametrize(
@@ -363,8 +363,8 @@ def test_until_the_window_is_full_the_model_runs_alone() -> None:
             states[gain].append(np.array(x[:2]))
             full = observer.output(0.0, x, u, p)["window_full"]
         assert full == 1.0
-    same = [bool((a == b).all()) for a, b in zip(*states.values(), strict=True)]
-    assert same == [True, True, False, False]
+    equal = [bool((a == b).all()) for a, b in zip(*states.values(), strict=True)]
+    assert equal == [True, True, False, False]
 
 
 def test_most_windows_beyond_the_table_are_warned_of() -> None:
@@ -376,8 +376,8 @@ def test_most_windows_beyond_the_table_are_warned_of() -> None:
     for k in range(6):
         u = observer.unpack_inputs(np.array([100.0 * (-1.0) ** k]))
         x = x._replace(**observer.jump("sampling", 0.0, x, u, p))
-    told = observer.output(0.0, x, observer.unpack_inputs(np.zeros(1)), p)
-    assert (told["window_count"], told["mostly_outside"]) == (4.0, 1.0)
+    reported = observer.output(0.0, x, observer.unpack_inputs(np.zeros(1)), p)
+    assert (reported["window_count"], reported["mostly_outside"]) == (4.0, 1.0)
 
 
 @pytest.mark.parametrize("cls", [CascadeSignature, CultureSignature, OscillatorSignature, ReactionSignature])

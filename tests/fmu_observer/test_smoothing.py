@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmu_observer.formulas.filtering.covariance_consistency import judge, normalised_squares
+from fmu_observer.formulas.filtering.covariance_consistency import evaluate, normalised_squares
 from fmu_observer.formulas.filtering.smoothing import _FilterPass, extended_pass, smooth, unscented_pass
 
 F = np.array([[1.0, 0.1, 0.005], [0.0, 1.0, 0.1], [0.0, 0.0, 0.97]])
@@ -134,7 +134,7 @@ def test_smoothing_a_nonlinear_recording_halves_the_errors() -> None:
         filtered, smoothed = (np.square(e - true).mean(axis=0) for e in (passed.estimates, found.estimates))
         assert (smoothed < 0.7 * filtered).all()
         squares = normalised_squares(found.estimates - true, found.covariances)
-        assert judge(squares, 2.0, white=False).verdict == "consistent"
+        assert evaluate(squares, 2.0, white=False).verdict == "consistent"
         assert (found.deviations <= np.sqrt(np.einsum("kii->ki", passed.covariances)) + 1e-12).all()
 
 

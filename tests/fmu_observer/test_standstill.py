@@ -22,7 +22,7 @@ FAULT = "odometer_fault"
 LATE = "delayed_train_observer"  # its packets come over a network
 
 
-def told(name: str) -> dict[str, Any]:
+def reported(name: str) -> dict[str, Any]:
     """The train and where it is, by the names that an observer has for them."""
     system = OBSERVERS[name]()
     known = {s.name for s in (*system.parameters, *system.states)}
@@ -47,7 +47,7 @@ def journey(name: str, stand: float, fault: str, spacing: float = 0.0) -> Any:
     slides = {"fault_onset": [STOPPED - 2.5], "fault_length": [2.5 * abs(kind)], "fault_kind": [kind or 1.0]}
     s.add("wheel", model="wheel_fault", options={"fault_count": 1}, parameters=slides)
     s.add("odometer", model="odometer", parameters={"sample_period": 0.01 if name == "stopping_uio" else PERIOD})
-    s.add(name, observer=name, parameters=told(name))
+    s.add(name, observer=name, parameters=reported(name))
     s.connect("driver.effort -> train.effort, wheel.effort", "train.speed -> driver.odometer")
     s.connect("train.wheel_speed -> wheel.speed", "wheel.wheel_speed -> odometer.wheel_speed")
     sources = {"effort": "driver.effort", "odometer": "odometer.reading"}
@@ -74,7 +74,7 @@ def departure(name: str, stand: float, fault: str, spacing: float) -> dict[str, 
 def bears_balises(name: str) -> bool:
     """Whether its gains are certified for a stop between two balises; the others run without any, on their models."""
     system = OBSERVERS[name]()
-    parameters = {k: v for k, v in told(name).items() if k in {s.name for s in system.parameters}}
+    parameters = {k: v for k, v in reported(name).items() if k in {s.name for s in system.parameters}}
     return not hasattr(system, "sampled_events") or next(system.findings(LONG, parameters)).holds
 
 
@@ -93,5 +93,5 @@ def test_ten_minutes_at_a_platform_change_nothing(name: str, fault: str) -> None
 
 def test_both_estimate_and_reading_must_rest() -> None:
     """An estimate that is held beside a wheel that turns must learn, and one that moves beside a still wheel."""
-    told_of = [stands(np.float64(v), y, 0.1) for v, y in ((0.0, 0.0), (0.0, -0.1), (0.0, 0.11), (1e-9, 0.0))]
-    assert told_of == [1.0, 1.0, 0.0, 0.0]
+    reported_of = [stands(np.float64(v), y, 0.1) for v, y in ((0.0, 0.0), (0.0, -0.1), (0.0, 0.11), (1e-9, 0.0))]
+    assert reported_of == [1.0, 1.0, 0.0, 0.0]

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from observer_runner import SystemRunner
-from test_innovation_gate import GAP, MAKERS, MOTION, bench_of
+from test_innovation_gate import GAP, MAKERS, MOTION, gated_of
 from test_kalman_filters import Vehicle
 
 from fmu_observer import OBSERVERS
@@ -27,13 +27,13 @@ ROBUST = BaliseMovingHorizon.name
 LAWFUL = {n: m for n, m in MAKERS.items() if n != ROBUST} | {
     f"{ROBUST} with squares": cache(partial(BaliseMovingHorizon, loss="squares"))
 }
-OFFSET, TOLD = 5.0, (0.0, 1.0, 5.0, 20.0, 63.0)
+OFFSET, REPORTED = 5.0, (0.0, 1.0, 5.0, 20.0, 63.0)
 every = pytest.mark.parametrize("make", LAWFUL.values(), ids=LAWFUL)
 
 
 def caused(make: Callable[[], GatedObserver], accuracy: float) -> float:
     """Largest error of the position, until the next one, that a balise makes which is off and tells so much [m]."""
-    runner = bench_of(make, OFF)
+    runner = gated_of(make, OFF)
     runner.runtime.advance(runner.runtime.t + GAP)
     place = MOTION.position(runner.runtime.t)
     before = abs(float(runner.runtime.x[0]) - place)
@@ -48,20 +48,20 @@ def caused(make: Callable[[], GatedObserver], accuracy: float) -> float:
 
 @every
 def test_the_error_of_a_balise_falls_with_the_accuracy_that_it_states(make: Callable[[], GatedObserver]) -> None:
-    errors = [caused(make, accuracy) for accuracy in TOLD]
+    errors = [caused(make, accuracy) for accuracy in REPORTED]
     assert errors[0] > 0.02, errors  # it acts
     assert all(later < earlier for earlier, later in pairwise(errors)), errors
     assert errors[-1] < 0.05 * errors[0], errors
 
 
 @every
-@pytest.mark.parametrize("told", [-1.0, float("nan"), 0.25])
+@pytest.mark.parametrize("reported", [-1.0, float("nan"), 0.25])
 def test_an_accuracy_that_is_none_or_better_than_the_floor_changes_no_bit(
-    make: Callable[[], GatedObserver], told: float
+    make: Callable[[], GatedObserver], reported: float
 ) -> None:
     ends = []
-    for accuracy in (0.0, told):
-        runner = bench_of(make, OFF)
+    for accuracy in (0.0, reported):
+        runner = gated_of(make, OFF)
         runner.runtime.advance(runner.runtime.t + GAP)
         runner.set("u", {"balise_position": MOTION.position(runner.runtime.t), "balise_location_accuracy": accuracy})
         runner.runtime.trigger("balise")
@@ -94,7 +94,7 @@ def test_filters_weigh_a_balise_by_its_variance(name: str, form: str) -> None:
 
 def test_a_robust_loss_makes_no_balise_weigh_more() -> None:
     robust, squares = MAKERS[ROBUST], LAWFUL[f"{ROBUST} with squares"]
-    for accuracy in TOLD:
+    for accuracy in REPORTED:
         assert caused(robust, accuracy) <= caused(squares, accuracy)
 
 
@@ -113,9 +113,9 @@ def test_what_a_stated_accuracy_leaves_is_reported_honestly() -> None:
             off = float(rng.uniform(-accuracy, accuracy) if accuracy > 0.0 else 0.5 * rng.normal())
             runner.set("u", {"balise_location_accuracy": accuracy})
             runner.balise(v * 15.0 * k + off)
-        told = runner.outputs()
-        wrong = told["position"] - v * 15.0 * 24, told["wheel_radius_error"] - (1.0 / (1.0 + scale) - 1.0)
-        ratios.append((wrong[0] / told["position_deviation"], wrong[1] / told["wheel_radius_error_deviation"]))
+        reported = runner.outputs()
+        wrong = reported["position"] - v * 15.0 * 24, reported["wheel_radius_error"] - (1.0 / (1.0 + scale) - 1.0)
+        ratios.append((wrong[0] / reported["position_deviation"], wrong[1] / reported["wheel_radius_error_deviation"]))
     rms = np.sqrt(np.mean(np.square(ratios), axis=0))
     assert np.abs(rms - 1.0).max() < 3.0 / np.sqrt(2.0 * 150.0)  # three deviations of the rms of so many
 
@@ -132,7 +132,9 @@ def test_the_position_bound_holds_with_balises_anywhere_in_their_accuracy(name: 
         for k in range(1, 8):
             runner.runtime.advance(4.0 * k)
             runner.balise(MOTION.position(4.0 * k) + float(rng.uniform(-accuracy, accuracy)))
-            told = runner.outputs()
-            assert abs(told["position"] - MOTION.position(4.0 * k)) <= told["position_bound"] + 1e-6  # of integration
-        widths.append(told["position_bound"])
+            reported = runner.outputs()
+            assert (
+                abs(reported["position"] - MOTION.position(4.0 * k)) <= reported["position_bound"] + 1e-6
+            )  # of integration
+        widths.append(reported["position_bound"])
     assert widths[:4] == sorted(widths[:4])

@@ -17,13 +17,13 @@ def verdicts(residuals: list[float], preset: str | None = None, **parameters: fl
     runtime.p[:] = SYSTEM.start_parameters(preset)
     for name, value in parameters.items():
         runtime.p[scalar_names(SYSTEM.parameter_signals).index(name)] = value
-    told = []
+    reported = []
     for k, residual in enumerate(residuals):
         runtime.u[0] = residual
         runtime.start(0.0) if k == 0 else runtime.advance(1e-3 * k)
         fault, recovering, _ = runtime.update_outputs()
-        told.append((float(fault), float(recovering)))
-    return told
+        reported.append((float(fault), float(recovering)))
+    return reported
 
 
 def test_begin_quiet_end() -> None:
@@ -45,8 +45,8 @@ def test_a_rise_without_quiet_before_it_counts_for_nothing() -> None:
 
 def test_a_false_alarm_ends_after_its_time_and_as_published_never() -> None:
     once = [0.006, *[0.0] * 30]
-    told = [f for f, _ in verdicts(once, longest_fault=0.02)]
-    assert told == [1.0] * 20 + [0.0] * 11
+    reported = [f for f, _ in verdicts(once, longest_fault=0.02)]
+    assert reported == [1.0] * 20 + [0.0] * 11
     assert [f for f, _ in verdicts(once, "as_published")] == [1.0] * 31
 
 

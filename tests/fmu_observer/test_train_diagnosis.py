@@ -30,31 +30,31 @@ def constant(value: float) -> Callable[[float], float]:
     return lambda _: value
 
 
-def judged(table: IsolationTable, *alarms: str, without: tuple[str, ...] = ()) -> tuple[set[str], set[str], float]:
+def evaluated(table: IsolationTable, *alarms: str, without: tuple[str, ...] = ()) -> tuple[set[str], set[str], float]:
     """Isolated and suspected faults of a set of alarms, and whether it is unexplained."""
     raised = [float(name in alarms) for name in table.residuals]
-    said = table.judge(raised, [float(name not in without) for name in table.residuals], [1.0] * len(table.faults))
-    names = [{f for f, on in zip(table.faults, told, strict=True) if on} for told in said[:2]]
+    said = table.evaluate(raised, [float(name not in without) for name in table.residuals], [1.0] * len(table.faults))
+    names = [{f for f, on in zip(table.faults, reported, strict=True) if on} for reported in said[:2]]
     return names[0], names[1], float(said.unexplained)
 
 
 @pytest.mark.parametrize("table", [MOTION, BRAKE])
 def test_the_residuals_that_a_fault_must_move_isolate_it(table: IsolationTable) -> None:
     for fault in table.faults:
-        assert judged(table, *table.must[fault]) == ({fault}, set(), 0.0)
+        assert evaluated(table, *table.must[fault]) == ({fault}, set(), 0.0)
 
 
 def test_alarms_say_what_they_can() -> None:
-    assert judged(MOTION) == (set(), set(), 0.0)
-    assert judged(MOTION, "odometers") == (set(), {"odometer_1", "odometer_2"}, 0.0)
+    assert evaluated(MOTION) == (set(), set(), 0.0)
+    assert evaluated(MOTION, "odometers") == (set(), {"odometer_1", "odometer_2"}, 0.0)
     # Satellites are less fine: while they are quiet radar and rail are equals.
-    assert judged(MOTION, "odometer_1_radar", "odometer_2_radar") == (set(), {"radar", "adhesion"}, 0.0)
-    assert judged(MOTION, "odometers", "radar_gps") == (set(), set(), 1.0)
-    assert judged(MOTION, "way_1") == ({"odometer_1"}, set(), 0.0)
+    assert evaluated(MOTION, "odometer_1_radar", "odometer_2_radar") == (set(), {"radar", "adhesion"}, 0.0)
+    assert evaluated(MOTION, "odometers", "radar_gps") == (set(), set(), 1.0)
+    assert evaluated(MOTION, "way_1") == ({"odometer_1"}, set(), 0.0)
     # Satellites may move it; but while none of what they must move is raised the radar explains it as well.
-    assert judged(MOTION, "radar_gps") == (set(), {"gps"}, 0.0)
-    assert judged(MOTION, "odometer_1_gps", "odometer_2_gps", "radar_gps") == ({"gps"}, set(), 0.0)
-    assert judged(BRAKE, "pressure") == (set(), {"pressure_sensor", "cylinder"}, 0.0)
+    assert evaluated(MOTION, "radar_gps") == (set(), {"gps"}, 0.0)
+    assert evaluated(MOTION, "odometer_1_gps", "odometer_2_gps", "radar_gps") == ({"gps"}, set(), 0.0)
+    assert evaluated(BRAKE, "pressure") == (set(), {"pressure_sensor", "cylinder"}, 0.0)
 
 
 def test_a_table_names_residuals_that_there_are() -> None:
@@ -74,7 +74,7 @@ def test_fewer_sensors_show_less() -> None:
         isolability(("odometer_1", "sonar"))
 
 
-def told(stop: float, signals: Signals, balises: dict[int, float] | None = None) -> list[dict[str, float]]:
+def reported(stop: float, signals: Signals, balises: dict[int, float] | None = None) -> list[dict[str, float]]:
     """Outputs at each sample; signals are functions of time, balises positions by the number of the sample."""
     system = TrainDiagnosis()
     runtime = Runtime(system)
@@ -95,12 +95,12 @@ def told(stop: float, signals: Signals, balises: dict[int, float] | None = None)
 
 def cruise(speed: float = 10.0, **others: Any) -> Signals:
     """All sensors of a train at a constant speed."""
-    same: Signals = dict.fromkeys(("odometer_1", "odometer_2", "radar"), constant(speed))
-    return same | {"gps_position": lambda t: speed * t, "cylinder_pressure": constant(0.0)} | others
+    equal: Signals = dict.fromkeys(("odometer_1", "odometer_2", "radar"), constant(speed))
+    return equal | {"gps_position": lambda t: speed * t, "cylinder_pressure": constant(0.0)} | others
 
 
 def test_an_odometer_that_is_off_without_an_effort_is_a_sensor() -> None:
-    rows = told(12.0, cruise(odometer_1=lambda t: 9.0 if t > 5.0 else 10.0))
+    rows = reported(12.0, cruise(odometer_1=lambda t: 9.0 if t > 5.0 else 10.0))
     codes = [row["odometer_1_fault"] for row in rows]
     assert set(codes[:50]) == {NONE}
     assert codes[-1] == SENSOR
@@ -113,10 +113,10 @@ def test_an_odometer_that_is_off_without_an_effort_is_a_sensor() -> None:
 
 def test_under_the_brake_such_a_reading_is_a_wheel() -> None:
     low = cruise(odometer_1=lambda t: 9.0 if t > 5.0 else 10.0, effort=lambda t: -40e3 if t < 14.0 else 0.0)
-    rows = told(20.0, low)
+    rows = reported(20.0, low)
     assert {row["odometer_1_fault"] for row in rows[90:140]} == {WHEEL}
     assert rows[-1]["odometer_1_fault"] == SENSOR  # the brake is released, and it goes on
-    high = told(12.0, cruise(odometer_1=lambda t: 11.0 if t > 5.0 else 10.0, effort=constant(-40e3)))
+    high = reported(12.0, cruise(odometer_1=lambda t: 11.0 if t > 5.0 else 10.0, effort=constant(-40e3)))
     assert high[-1]["odometer_1_fault"] == SENSOR  # no brake makes a wheel fast
 
 
@@ -126,7 +126,7 @@ def test_a_sensor_that_stands_still_is_stuck() -> None:
 
     moving: Signals = dict.fromkeys(("odometer_1", "odometer_2", "radar"), speed)
     moving |= {"gps_position": lambda t: 10.0 * t + 0.1 * t * t, "radar": lambda t: speed(min(t, 5.0))}
-    assert told(16.0, moving)[-1]["radar_fault"] == STUCK
+    assert reported(16.0, moving)[-1]["radar_fault"] == STUCK
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -145,7 +145,7 @@ def test_what_is_detected_is_reported_although_it_is_not_isolated(seed: int) -> 
         return lambda t: healthy(t) * (1.0 + gain) + offsets.get(name, 0.0) if t > begins[name] else healthy(t)
 
     right = cruise(12.0)
-    rows = told(16.0, right | {n: off(n, g, right[n]) for n, g in zip(names, gains, strict=True) if n in begins})
+    rows = reported(16.0, right | {n: off(n, g, right[n]) for n, g in zip(names, gains, strict=True) if n in begins})
     lasting = 0
     for row in rows:
         above = any(value > 1.0 for name, value in row.items() if name.startswith("ratio_"))
@@ -174,7 +174,7 @@ def test_two_faults_of_motion_are_reported_and_one_is_not_reported_as_several(fa
         for name in ("odometer_1", "odometer_2", "radar"):  # a reading that never changes would be stuck
             signals[name] = faulty(lambda t: 12.0 + 0.02 * math.sin(40.0 * t), 0.1 * off.get(name, 0.0), 0.0)
         balises = {100 * i: 120.0 * i + (6.0 * off.get("balise", 0.0) if i == 4 else 0.0) for i in range(1, 6)}
-        rows = told(55.0, signals, balises)
+        rows = reported(55.0, signals, balises)
         named = {fault for fault in FAULTS if any(row[f"{fault}_fault"] >= WHEEL for row in rows)}
         several = any(row["several_faults"] for row in rows)
         assert named <= set(faults), off
@@ -192,7 +192,7 @@ def test_an_isolated_fault_is_not_replaced_by_another_while_it_lasts() -> None:
             * (1.0 + share * (0.1 if 30.0 < t < 34.0 else 0.045 if t > 30.0 else 0.0))
         )
     way = 120.0 + 12.0 * (4.0 * 0.1 + 6.0 * 0.045)  # [m] of the radar from 30 to 40 s
-    rows = told(50.0, signals, {100 * i: 120.0 * i + (way - 120.0 if i == 4 else 0.0) for i in range(1, 5)})
+    rows = reported(50.0, signals, {100 * i: 120.0 * i + (way - 120.0 if i == 4 else 0.0) for i in range(1, 5)})
     after = rows[405:]
     assert {row["radar_fault"] for row in rows[340:]} == {SENSOR}
     assert {row["adhesion_fault"] for row in after} == {NONE}
@@ -201,10 +201,10 @@ def test_an_isolated_fault_is_not_replaced_by_another_while_it_lasts() -> None:
 
 def test_without_a_third_source_both_are_suspected() -> None:
     two: Signals = {"odometer_1": lambda t: 9.0 if t > 5.0 else 10.0, "odometer_2": constant(10.0)}
-    last = told(12.0, two)[-1]
+    last = reported(12.0, two)[-1]
     assert (last["odometer_1_fault"], last["odometer_2_fault"]) == (SUSPECTED, SUSPECTED)
     assert last["isolation_limited"] == 1.0
-    assert told(1.0, cruise())[-1]["isolation_limited"] == 0.0
+    assert reported(1.0, cruise())[-1]["isolation_limited"] == 0.0
 
 
 def test_a_threshold_of_zero_is_refused() -> None:
@@ -238,13 +238,13 @@ def test_the_share_of_a_constant_force_is_found(share: float) -> None:
 def test_each_missing_sensor_that_isolation_needs_is_reported(missing: str) -> None:
     signals = cruise()
     del signals[missing]
-    assert told(0.5, signals)[-1]["isolation_limited"] == 1.0
+    assert reported(0.5, signals)[-1]["isolation_limited"] == 1.0
     del (without := cruise())["gps_position"]
-    assert told(0.5, without)[-1]["isolation_limited"] == 0.0  # the table isolates all without satellites
+    assert reported(0.5, without)[-1]["isolation_limited"] == 0.0  # the table isolates all without satellites
 
 
 def test_an_alarm_that_outlasts_its_residual_keeps_its_confidence() -> None:
-    rows = told(13.0, cruise(odometer_1=lambda t: 9.0 if 5.0 < t < 9.0 else 10.0))
+    rows = reported(13.0, cruise(odometer_1=lambda t: 9.0 if 5.0 < t < 9.0 else 10.0))
     names = ("odometers", "odometer_1_radar", "odometer_1_gps")
     gone = [r for r in rows if r["fault_count"] > 0 and max(r[f"ratio_{n}"] for n in names) <= 1.0]
     assert gone
@@ -261,7 +261,7 @@ def test_a_share_outside_of_the_grid_is_unknown() -> None:
         found = brake_share(stops.demanded, stops, 1.5 * np.ones(()), 1.0, 1e5, p)
         assert (float(found.found), float(found.bracketed)) == (1.0, bracketed)
     assert float(found.value) == pytest.approx(float(p.most_share))
-    last = told(2.0, cruise())[-1]
+    last = reported(2.0, cruise())[-1]
     assert last["shares_unknown"] == 3.0 == sum(last[f"{s}_unknown"] for s in SHARES)
 
 
@@ -270,10 +270,10 @@ def test_a_case_of_the_scenario_is_isolated_in_time_and_alone(case: str) -> None
     outcome = cosim.Scenario.load("train_diagnosis").set("case", case).run().check()
     assert len(outcome.expectations) == 5  # quiet before, in time, code from both sides, nothing else
     assert not any("not checked against the balise gaps" in warning for warning in outcome.warnings)
-    (told,) = fault_detection(outcome.result, outcome.spec)
-    assert (told.faults, told.missed, told.false) == (1, 0, 0)
+    (reported,) = fault_detection(outcome.result, outcome.spec)
+    assert (reported.faults, reported.missed, reported.false) == (1, 0, 0)
     assert outcome.spec.delay_limit is not None
-    assert told.within(outcome.spec.delay_limit)
+    assert reported.within(outcome.spec.delay_limit)
 
 
 def test_each_case_of_the_scenario_is_evaluated_by_the_output_of_its_own_fault() -> None:

@@ -38,8 +38,8 @@ def test_a_preset_takes_any_train(name: str, preset: str | None) -> None:
     system = OBSERVERS[name]()
     known = {s.name for s in system.parameter_signals}
     for train, values in TRAINS.items():
-        told = {key: value for key, value in zip(NAMES, values, strict=True) if key in known}
-        chosen = parameter_values(system, told, preset, "of " + train)
+        reported = {key: value for key, value in zip(NAMES, values, strict=True) if key in known}
+        chosen = parameter_values(system, reported, preset, "of " + train)
         runtime = Runtime(system)
         runtime.p[: len(chosen)] = chosen
         runtime.start(0.0)

@@ -65,8 +65,8 @@ def together(observer: Any, times: list[float], disturbance: Any, preset: str | 
             part = solve_ivp(flow, (left, min(left + PIECE, end)), x, method="DOP853", rtol=1e-12, atol=1e-13)
             x = part.y[:, -1]
         begin = end
-        told = observer.output_vector(end, x[n:], inputs(end - 1e-9, x), p)
-        rows.append((x[:n], x[n:], dict(zip(scalar_names(observer.outputs), told, strict=True))))
+        reported = observer.output_vector(end, x[n:], inputs(end - 1e-9, x), p)
+        rows.append((x[:n], x[n:], dict(zip(scalar_names(observer.outputs), reported, strict=True))))
     return tuple(zip(*rows, strict=True))  # type: ignore[return-value]
 
 
@@ -209,9 +209,9 @@ def test_unknown_inputs_that_are_not_declared_are_errors_of_the_known_ones() -> 
     runtime.u[names.index("measured_angle")] = x[0]
     runtime.start(0.0)
     for k in range(1, 20_001):
-        told = u + 0.3
-        middle = x + 0.5 * step * np.asarray(truth.flow(x, told))
-        x = x + step * np.asarray(truth.flow(middle, told))
+        reported = u + 0.3
+        middle = x + 0.5 * step * np.asarray(truth.flow(x, reported))
+        x = x + step * np.asarray(truth.flow(middle, reported))
         runtime.u[names.index("measured_angle")] = x[0]
         runtime.advance(k * step)
     found = dict(zip(scalar_names(observer.outputs), runtime.update_outputs(), strict=True))

@@ -458,9 +458,9 @@ def component(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Compon
     alive: list[Component] = []
 
     def make(system: str | HybridSystem | Path, version: int, logging: bool = False, counts: bool = False) -> Component:
-        given = make_system(system) if isinstance(system, str) else system
+        stated = make_system(system) if isinstance(system, str) else system
         protocol = EventProtocol("counts" if counts else None)
-        fmu = given if isinstance(given, Path) else cached_fmu(given, version, protocol=protocol)  # type: ignore[arg-type]
+        fmu = stated if isinstance(stated, Path) else cached_fmu(stated, version, protocol=protocol)  # type: ignore[arg-type]
         made = Component(fmu, unpacked(fmu))
         made.instantiate(logging)
         alive.append(made)

@@ -39,7 +39,7 @@ class Update:
 
 
 @dataclass(frozen=True)
-class Told:
+class Notified:
     """An event that the importer tells the model at `time`, with a stamp or without."""
 
     time: float
@@ -108,27 +108,27 @@ class Exchange:
             if not again:
                 return Update(changed, float(instant) if defined else inf)
 
-    def happen(self, told: Sequence[Told] = (), **inputs: float) -> Update:
+    def happen(self, reported: Sequence[Notified] = (), **inputs: float) -> Update:
         """An event now: event mode, inputs, what is told, update, and back."""
         self.model.enterEventMode()
         self.set(**inputs)
-        for one in told:
+        for one in reported:
             self.tell(one)
         update = self.update()
         self.model.enterContinuousTimeMode()
         return update
 
-    def tell(self, told: Told) -> None:
+    def tell(self, reported: Notified) -> None:
         """In event mode: by clock, or by count where the model has one."""
-        stamp = {} if told.stamp is None else {f"{told.name}_time": told.stamp}
-        count = self.by_name.get(f"{told.name}_count")
+        stamp = {} if reported.stamp is None else {f"{reported.name}_time": reported.stamp}
+        count = self.by_name.get(f"{reported.name}_count")
         if count is None:
-            self.model.setClock([self.by_name[told.name].valueReference], [True])
+            self.model.setClock([self.by_name[reported.name].valueReference], [True])
         elif self.version == 2:
             self.model.setInteger([count.valueReference], [self.model.getInteger([count.valueReference])[0] + 1])
         else:
             self.model.setInt32([count.valueReference], [self.model.getInt32([count.valueReference])[0] + 1])
-        self.set(**dict(told.payload), **stamp)
+        self.set(**dict(reported.payload), **stamp)
 
     # -- values -----------------------------------------------------------------------------------------------------
 
@@ -247,9 +247,9 @@ class Importer:
                 self.run.time_events.append(self.t)
                 self._event()
 
-    def happen(self, told: Sequence[Told] = (), **inputs: float) -> None:
+    def happen(self, reported: Sequence[Notified] = (), **inputs: float) -> None:
         """An event that the importer causes."""
-        self.next_time = self.exchange.happen(told, **inputs).next_time
+        self.next_time = self.exchange.happen(reported, **inputs).next_time
 
     # -- internals --------------------------------------------------------------------------------------------------
 

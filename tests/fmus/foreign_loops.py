@@ -158,8 +158,8 @@ def _system_structure(input_instant: int) -> str:
     lines = ['<OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">']
     lines += ["<StartTime>0.0</StartTime>", f"<BaseStepSize>{STEP}</BaseStepSize>", "<Algorithm>fixedStep</Algorithm>"]
     lines += ["<Simulators>"]
-    for name, given in values.items():
-        initial = f"<InitialValues>{''.join(given)}</InitialValues>" if given else ""
+    for name, stated in values.items():
+        initial = f"<InitialValues>{''.join(stated)}</InitialValues>" if stated else ""
         lines += [f'<Simulator name="{name}" source="{name}.fmu" stepSize="{STEP}">{initial}</Simulator>']
     lines += ["</Simulators>", "<Connections>"]
     for link in LINKS:
@@ -225,8 +225,8 @@ class Accuracy:
 def accuracy(table: np.ndarray, lag: int) -> Accuracy:
     """Stamps against the plant's own crossings, the observer against one that is told at these instants."""
     instants, _ = fine_crossings(table)
-    exact, told = exact_observer(table, instants, lag), in_time(table, instants, lag)
-    errors = {name: np.abs(table[f"observer.{name}"] - exact[name])[told].max() for name in ("position", "speed")}
+    exact, reported = exact_observer(table, instants, lag), in_time(table, instants, lag)
+    errors = {name: np.abs(table[f"observer.{name}"] - exact[name])[reported].max() for name in ("position", "speed")}
     return Accuracy(
         float(np.abs(Crossings.of(table).stamps - instants).max()), float(errors["position"]), float(errors["speed"])
     )
@@ -300,17 +300,17 @@ def exact_observer(table: np.ndarray, instants: np.ndarray, lag: int) -> dict[st
     names = scalar_names(system.input_signals)
     effort, odometer, place = (names.index(name) for name in ("effort", "odometer", "balise_position"))
     columns = [scalar_names(system.outputs).index(name) for name in ("position", "speed")]
-    rows, told = np.zeros((len(table), 2)), 0
+    rows, reported = np.zeros((len(table), 2)), 0
     observer.start(0.0)
     rows[0] = observer.update_outputs()[columns]
     for k in range(len(table) - 1):
         row = k + 1 - lag
         observer.u[[effort, odometer]] = table["driver.effort"][k], table["odometer.reading"][row]
-        while told < len(instants) and instants[told] <= (k + 1) * STEP:
-            observer.advance(float(instants[told]))
-            observer.u[place] = SPACING * (told + 1)
+        while reported < len(instants) and instants[reported] <= (k + 1) * STEP:
+            observer.advance(float(instants[reported]))
+            observer.u[place] = SPACING * (reported + 1)
             observer.trigger("balise")
-            told += 1
+            reported += 1
         observer.advance((k + 1) * STEP)
         rows[k + 1] = observer.update_outputs()[columns]
     return {"position": rows[:, 0], "speed": rows[:, 1]}

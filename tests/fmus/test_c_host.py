@@ -154,8 +154,8 @@ def test_the_loop_in_c_is_the_loop_of_the_master(
     rows = announced(table)
     assert len(rows) > 130
     assert table["reader.lost_count"].max() == 0.0
-    same, exact = master("interpolate"), master("rollback")
-    for outcome in (same, exact):
+    equal, exact = master("interpolate"), master("rollback")
+    for outcome in (equal, exact):
         np.testing.assert_array_equal(table["train.position"], at_points(outcome, "train.position", table["time"]))
         np.testing.assert_array_equal(
             table["reader.balise_position"][rows], [e.position for e in outcome.result.events]
@@ -164,9 +164,9 @@ def test_the_loop_in_c_is_the_loop_of_the_master(
     # The same cubic, solved twice: two roundings of a time of 60 s (7e-15) are all that can differ, and what they do to
     # the observer, which corrects its speed by about 20 1/s of the position that the train ran in between.
     stamps = table["reader.balise_time"][rows]
-    np.testing.assert_allclose(stamps, [e.stamp for e in same.result.events], rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(stamps, [e.stamp for e in equal.result.events], rtol=0.0, atol=1e-13)
     for name in OBSERVED:
-        np.testing.assert_allclose(table[name], at_points(same, name, table["time"]), rtol=1e-12, atol=1e-11)
+        np.testing.assert_allclose(table[name], at_points(equal, name, table["time"]), rtol=1e-12, atol=1e-11)
 
     # Against the plant's own crossing by root search on re-done steps what differs is the cubic: h^4/384 times the
     # fourth derivative of the position over the speed. The jerk of this train changes by its own size within some 50 ms

@@ -21,7 +21,7 @@ from plant_models.hybrid.noise import Purpose, _philox4x32, is_seed, seed_of, st
 pytestmark = pytest.mark.compiler
 
 WORD = st.integers(0, 2**32 - 1)
-KNOWN_ANSWERS = [  # Random123, kat_vectors, philox4x32 10
+KNOWN_VALUES = [  # Random123, kat_vectors, philox4x32 10
     ((0, 0, 0, 0), (0, 0), (0x6627E8D5, 0xE169C58D, 0xBC57AC4C, 0x9B00DBD8)),
     ((0xFFFFFFFF,) * 4, (0xFFFFFFFF,) * 2, (0x408F276D, 0x41C83B0E, 0xA20BC7C6, 0x6D5451FD)),
     (
@@ -68,11 +68,11 @@ def _philox(library: Any, counter: tuple[int, ...], key: tuple[int, int]) -> tup
     return tuple(words)
 
 
-@pytest.mark.parametrize(("counter", "key", "answer"), KNOWN_ANSWERS)
+@pytest.mark.parametrize(("counter", "key", "response"), KNOWN_VALUES)
 def test_philox_known_values(
-    noise: Any, counter: tuple[int, ...], key: tuple[int, int], answer: tuple[int, ...]
+    noise: Any, counter: tuple[int, ...], key: tuple[int, int], response: tuple[int, ...]
 ) -> None:
-    assert _philox(noise, counter, key) == answer
+    assert _philox(noise, counter, key) == response
 
 
 @given(st.tuples(WORD, WORD, WORD, WORD), st.tuples(WORD, WORD))

@@ -68,9 +68,9 @@ def test_elements_of_arrays_are_outputs_and_inputs(tmp_path: Path) -> None:
             write()
             slave.advance(0.0, 0.1)
             matrix = slave.read([f"y_matrix[{i},{j}]" for i in (1, 2) for j in (1, 2, 3)]).reshape(2, 3)
-            given = np.zeros((2, 3))
-            given[1, 0] = 7.0
-            np.testing.assert_array_equal(matrix, expected("u_matrix", given.tolist()))
+            stated = np.zeros((2, 3))
+            stated[1, 0] = 7.0
+            np.testing.assert_array_equal(matrix, expected("u_matrix", stated.tolist()))
         finally:
             slave.terminate()
             slave.free()

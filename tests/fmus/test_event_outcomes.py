@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exchange_importer import Exchange, Importer, Told
+from exchange_importer import Exchange, Importer, Notified
 from fmpy.fmi1 import FMICallException
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -53,9 +53,9 @@ def trackers(component: Callable[..., Any], reference: Callable[[str], Any]) -> 
 
 @dataclass(frozen=True)
 class Announced:
-    """One event: told before step `told`, and how far its stamp lies ahead (behind where negative) [s]."""
+    """One event: notified before step `notified`, and how far its stamp lies ahead (behind where negative) [s]."""
 
-    told: int
+    reported: int
     name: str
     ahead: float
 
@@ -63,14 +63,14 @@ class Announced:
 ANNOUNCED = st.builds(
     Announced, st.integers(0, STEPS - 1), st.sampled_from(NAMES), st.integers(-6, 6).map(lambda n: 0.07 * n)
 )  # a stamp never lies on a communication point, nor at the edge of the horizon
-HAPPENINGS = st.lists(ANNOUNCED, max_size=8, unique_by=lambda a: (a.told, a.name))
+HAPPENINGS = st.lists(ANNOUNCED, max_size=8, unique_by=lambda a: (a.reported, a.name))
 
 
 def expected(happenings: list[Announced], policy: str, end: float) -> dict[str, int]:
     """What the stamps alone say."""
     said = counted()
     for happening in happenings:
-        stamp = happening.told * H + happening.ahead
+        stamp = happening.reported * H + happening.ahead
         if happening.ahead >= 0.0:
             said["accepted"] += stamp <= end + 1e-9
         elif policy == "late":
@@ -89,7 +89,7 @@ def drive(one: Any, happenings: list[Announced], first: int, last: int) -> None:
     for k in range(first, last):
         one.set(odometer=10.0 + 0.1 * k)
         for happening in happenings:
-            if happening.told == k:
+            if happening.reported == k:
                 payload = {"balise_position": 1.0 * k} if happening.name == "balise" else {"telegram_speed": 9.0}
                 one.event(happening.name, k * H + happening.ahead, **payload)
         one.step(k * H, H)
@@ -178,17 +178,17 @@ def test_model_exchange(version: int, policy: str, exchange: Callable[..., Excha
     def now() -> dict[str, int]:
         return dict(zip(OUTCOME_TEXTS, get(references), strict=True))
 
-    importer.happen([Told(0.0, "balise", {"balise_position": 1.0})])
+    importer.happen([Notified(0.0, "balise", {"balise_position": 1.0})])
     assert now() == counted(accepted=1)
-    importer.happen([Told(0.0, "balise", {"balise_position": 2.0}, stamp=0.12)])
+    importer.happen([Notified(0.0, "balise", {"balise_position": 2.0}, stamp=0.12)])
     assert now() == counted(accepted=1)
     importer.advance(0.27)
     assert now() == counted(accepted=2)
-    importer.happen([Told(0.27, "balise", {"balise_position": 50.0}, stamp=0.1)])
+    importer.happen([Notified(0.27, "balise", {"balise_position": 50.0}, stamp=0.1)])
     last = counted(accepted=3, late=1) if policy == "late" else counted(accepted=2, rejected=1)
     assert now() == last
     content = one.save()
-    importer.happen([Told(0.27, "telegram", {"telegram_speed": 1.0})])
+    importer.happen([Notified(0.27, "telegram", {"telegram_speed": 1.0})])
     assert now() == last | {"accepted": last["accepted"] + 1}
     one.restore(content)
     assert now() == last

@@ -30,26 +30,26 @@ KINDS = {"fmi2": (2, False), "fmi3 clocks": (3, False), "fmi3 counts": (3, True)
 
 
 @dataclass
-class Told:
+class Notified:
     """An event, the step in which it falls, and the step before which it is told."""
 
     stamp: float
     name: str
     payload: Mapping[str, float]
     step: int
-    told: int
+    reported: int
 
 
 def _kick(impulse: float) -> dict[str, float]:
     return {"kick_impulse": impulse, "kick_share[1]": 0.5 + 0.1 * impulse, "kick_share[2]": -0.1 * impulse}
 
 
-def _told(stamp: float, event: tuple[str, Mapping[str, float]], delay: int) -> Told:
+def _reported(stamp: float, event: tuple[str, Mapping[str, float]], delay: int) -> Notified:
     step = int(np.searchsorted(np.arange(STEPS) * H, stamp + 1e-15, side="right")) - 1  # equal but for rounding
-    told = min(STEPS, step + delay)
-    if delay > 0 and told * H - stamp < 1.1e-9:  # a nanosecond later is not late but now, so one step later then
-        told = told + 1 if told < STEPS else step
-    return Told(stamp, event[0], event[1], step, told)
+    reported = min(STEPS, step + delay)
+    if delay > 0 and reported * H - stamp < 1.1e-9:  # a nanosecond later is not late but now, so one step later then
+        reported = reported + 1 if reported < STEPS else step
+    return Notified(stamp, event[0], event[1], step, reported)
 
 
 STAMPS = st.one_of(
@@ -59,13 +59,13 @@ STAMPS = st.one_of(
     st.integers(0, 16).map(lambda k: 0.013 + k * 0.07),  # on a sampling instant
 )
 EVENTS = st.one_of(st.floats(-3.0, 3.0).map(lambda i: ("kick", _kick(i))), st.just(("mark", {})))
-HAPPENINGS = st.lists(st.builds(_told, STAMPS, EVENTS, st.integers(0, STEPS)), min_size=1, max_size=6)
+HAPPENINGS = st.lists(st.builds(_reported, STAMPS, EVENTS, st.integers(0, STEPS)), min_size=1, max_size=6)
 
 
-def _tellable(happenings: list[Told]) -> bool:
+def _tellable(happenings: list[Notified]) -> bool:
     """Not less than a nanosecond apart, which is one instant; a count tells of one event of each name before a step."""
     apart = bool((np.diff(sorted(h.stamp for h in happenings)) > 3e-9).all())
-    return apart and len({(h.name, h.told) for h in happenings}) == len(happenings)
+    return apart and len({(h.name, h.reported) for h in happenings}) == len(happenings)
 
 
 def _weather(k: int) -> dict[str, float]:
@@ -79,13 +79,13 @@ def _weather(k: int) -> dict[str, float]:
     }
 
 
-def _run(one: Any, happenings: list[Told], in_time: bool) -> np.ndarray:
+def _run(one: Any, happenings: list[Notified], in_time: bool) -> np.ndarray:
     one.slave.reset()
     one.initialize()
     for k in range(STEPS + 1):
         one.set_all(_weather(k))
         for happening in happenings:
-            if k == (happening.step if in_time else happening.told):
+            if k == (happening.step if in_time else happening.reported):
                 one.event(happening.name, happening.stamp, **happening.payload)
         one.step(k * H, H)
     return np.append(one.values(), one.get("time"))
@@ -102,7 +102,7 @@ def _as_block(made: Any, system: Any, **arguments: Any) -> Any:
 @settings(max_examples=60, deadline=None, suppress_health_check=FIXTURES_LIVE_ON)
 @given(happenings=HAPPENINGS.filter(_tellable))
 def test_events_notified_late_in_any_order_have_the_effect_of_events_notified_in_time(
-    happenings: list[Told], hoppers: dict[str, Any]
+    happenings: list[Notified], hoppers: dict[str, Any]
 ) -> None:
     in_time = _run(hoppers["block"], sorted(happenings, key=lambda h: h.stamp), in_time=True)
     for name, one in hoppers.items():

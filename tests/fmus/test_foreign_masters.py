@@ -70,12 +70,12 @@ def test_events_are_exact_in_a_foreign_master(
     assert found.position <= POSITION
     assert found.speed <= SPEED
 
-    exact, told = exact_observer(table, instants, lag), in_time(table, instants, lag)
-    assert told.mean() > 0.9
+    exact, reported = exact_observer(table, instants, lag), in_time(table, instants, lag)
+    assert reported.mean() > 0.9
     if lag == 0:
-        assert told[1:].all()  # nothing is ever told late
+        assert reported[1:].all()  # nothing is ever told late
     else:
-        late = np.abs(table["observer.speed"] - exact["speed"])[1:][~told[1:]]
+        late = np.abs(table["observer.speed"] - exact["speed"])[1:][~reported[1:]]
         assert late.max() > 1e-3  # for a step or two it does not know
 
 

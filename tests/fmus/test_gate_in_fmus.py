@@ -49,12 +49,14 @@ def begin(one: Any, **starts: float) -> None:
     one.initialize(**dict(zip(own, (0.0, SPEED), strict=True)), effort=1400.0, odometer=SPEED, **starts)
 
 
-def drive(one: Any, told: list[tuple[int, float, float]], first: int = 0, last: int = STEPS, parts: int = 1) -> None:
+def drive(
+    one: Any, reported: list[tuple[int, float, float]], first: int = 0, last: int = STEPS, parts: int = 1
+) -> None:
     """Steps `first` up to `last`, each in so many parts; of telegrams of one step the one announced by a count comes
     alone.
     """
     for k in range(first, last):
-        for step, stamp, position in told:
+        for step, stamp, position in reported:
             if step == k:
                 one.event("balise", stamp, balise_position=position)
         for part in range(parts):

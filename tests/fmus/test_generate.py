@@ -28,13 +28,13 @@ class Hasty(HybridSystem):
     name = "hasty"
     states = (state("place", "m"),)
     outputs = (output_signal("place_out", "m"),)
-    events = (TriggeredEvent("tell", (input_signal("tell_place", "m", variability="discrete"),)),)
+    events = (TriggeredEvent("report", (input_signal("report_place", "m", variability="discrete"),)),)
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"place": u.tell_place - x.place}
+        return {"place": u.report_place - x.place}
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"place": u.tell_place}
+        return {"place": u.report_place}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         return {"place_out": x.place}
@@ -42,7 +42,7 @@ class Hasty(HybridSystem):
 
 def test_a_payload_read_outside_its_event_is_refused() -> None:
     with pytest.raises(
-        ValueError, match="hasty: step reads tell_place, which is known only at the event; keep it in memory"
+        ValueError, match="hasty: step reads report_place, which is known only at the event; keep it in memory"
     ):
         trace_equations(Hasty())
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exchange_importer import Exchange, Importer, Told
+from exchange_importer import Exchange, Importer, Notified
 from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
@@ -55,12 +55,12 @@ class Follower(HybridSystem):
 
     name = "follower"
     states = (memory("held", "m"),)
-    inputs = (input_signal("given", "m"),)
+    inputs = (input_signal("stated", "m"),)
     outputs = (output_signal("held_out", "m"),)
     events = (CommunicationEvent("reading"),)
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"held": u.given}
+        return {"held": u.stated}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         return {"held_out": x.held}
@@ -218,7 +218,7 @@ def test_stamp_ahead_waits_and_is_the_next_time_event(version: int, exchange: Ca
     one = exchange("tracker", version)
     importer = Importer(one, one.initialize())
     importer.advance(0.11)
-    importer.happen([Told(0.11, "balise", {"balise_position": 50.0}, stamp=0.1375)])
+    importer.happen([Notified(0.11, "balise", {"balise_position": 50.0}, stamp=0.1375)])
     assert importer.next_time == 0.1375  # before the periodic event at 0.15
     assert one.get("innovation")[0] == 0.0
     importer.advance(0.1375)
@@ -229,10 +229,10 @@ def test_stamp_ahead_waits_and_is_the_next_time_event(version: int, exchange: Ca
 def test_payload_is_that_of_the_announcement(version: int, exchange: Callable[..., Exchange]) -> None:
     one = exchange("tracker", version)
     importer = Importer(one, one.initialize())
-    importer.happen([Told(0.0, "balise", {"balise_position": 50.0}, stamp=0.02)])
-    importer.happen([Told(0.0, "telegram", {"telegram_speed": 3.0, "telegram_weight": 1.0})])
+    importer.happen([Notified(0.0, "balise", {"balise_position": 50.0}, stamp=0.02)])
+    importer.happen([Notified(0.0, "telegram", {"telegram_speed": 3.0, "telegram_weight": 1.0})])
     assert one.get("speed")[0] == 3.0
-    importer.happen([Told(0.0, "balise", {"balise_position": -70.0}, stamp=0.04)])
+    importer.happen([Notified(0.0, "balise", {"balise_position": -70.0}, stamp=0.04)])
     importer.advance(0.03)
     assert 45.0 < one.get("innovation")[0] <= 50.0
     importer.advance(0.04)
@@ -248,7 +248,7 @@ def test_late_event_goes_by_the_policy(
     (one.model.setInteger if version == 2 else one.model.setInt64)(reference, [policy])
     importer = Importer(one, one.initialize())
     importer.advance(0.27)
-    importer.happen([Told(0.27, "balise", {"balise_position": 50.0}, stamp=0.1)])
+    importer.happen([Notified(0.27, "balise", {"balise_position": 50.0}, stamp=0.1)])
     assert (one.get("innovation")[0] != 0.0) == applied
     warned = [line for line in one.log if "before the current time" in line]
     assert len(warned) == (0 if applied else 1)
@@ -263,7 +263,7 @@ def test_event_that_waited_is_not_late_where_the_solver_stops_behind_it(
 ) -> None:
     one = exchange("tracker", version)
     one.initialize()
-    assert one.happen([Told(0.0, "balise", {"balise_position": 50.0}, stamp=0.02)]).next_time == 0.02
+    assert one.happen([Notified(0.0, "balise", {"balise_position": 50.0}, stamp=0.02)]).next_time == 0.02
     one.model.setTime(0.021)  # an importer with a coarse step
     one.happen()
     assert one.get("innovation")[0] == 50.0
@@ -276,7 +276,7 @@ def test_counts_announce_in_fmi_3_as_well(counting_tracker: Path, exchange: Call
     for one in (counted, clocked):
         importer = Importer(one, one.initialize(odometer=10.0))
         importer.advance(0.2)
-        importer.happen([Told(0.2, "balise", {"balise_position": 2.5})])
+        importer.happen([Notified(0.2, "balise", {"balise_position": 2.5})])
         importer.advance(0.4)
         rows.append(one.get("position", "speed", "innovation"))
     np.testing.assert_array_equal(rows[0], rows[1])
@@ -320,11 +320,11 @@ def test_derivative_that_is_no_number_is_discarded(version: int, exchange: Calla
 def _prepared(one: Exchange, system: HybridSystem) -> Importer:
     """Some way into a run, with an event that still waits."""
     inputs = {"effort": 3.0e4, "force": -4.0, "odometer": 9.0, "speed": 9.5, "wheel_speed": 5.0}
-    given = {s.name: inputs[s.name] for s in system.inputs if s.name in inputs}
-    importer = Importer(one, one.initialize(**given), method="Radau", rtol=1e-6, atol=1e-8)
+    stated = {s.name: inputs[s.name] for s in system.inputs if s.name in inputs}
+    importer = Importer(one, one.initialize(**stated), method="Radau", rtol=1e-6, atol=1e-8)
     importer.advance(0.23)
-    told = [Told(0.23, e.name, {s.name: 2.0 for s in e.payload}, stamp=0.3) for e in system.triggered_events]
-    importer.happen(told)
+    reported = [Notified(0.23, e.name, {s.name: 2.0 for s in e.payload}, stamp=0.3) for e in system.triggered_events]
+    importer.happen(reported)
     importer.advance(0.27)
     return importer
 

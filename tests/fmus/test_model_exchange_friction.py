@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exchange_importer import Exchange, Importer, Told
+from exchange_importer import Exchange, Importer, Notified
 from fmpy import simulate_fmu
 from scipy.optimize import brentq
 
@@ -206,7 +206,7 @@ def test_jump_may_turn_the_motion_round(version: int, exchange: Callable[..., Ex
     model = exchange(SYSTEM, version)
     importer = _importer(model, speed=1.0)
     importer.advance(0.25)
-    importer.happen([Told(0.25, "blow", {"blow_speed": -2.0})])
+    importer.happen([Notified(0.25, "blow", {"blow_speed": -2.0})])
     assert model.get("speed")[0] == -2.0  # not stopped on the way
     assert model.derivatives().tolist() == [-2.0, GRIP / MASS]
     importer.advance(4.0)

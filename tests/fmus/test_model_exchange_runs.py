@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exchange_importer import Exchange, Importer, Told
+from exchange_importer import Exchange, Importer, Notified
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 from shipped import shipped
@@ -84,9 +84,9 @@ def _starts(name: str, system: HybridSystem) -> dict[str, float]:
     return inputs | dict(STARTS.get(name, {}))
 
 
-def _told(system: HybridSystem) -> list[Told]:
+def _reported(system: HybridSystem) -> list[Notified]:
     events = system.triggered_events
-    return [Told(EVENT_TIME, e.name, PAYLOADS.get(e.name, {s.name: 0.4 for s in e.payload})) for e in events]
+    return [Notified(EVENT_TIME, e.name, PAYLOADS.get(e.name, {s.name: 0.4 for s in e.payload})) for e in events]
 
 
 def _values(description: Any) -> list[str]:
@@ -100,11 +100,11 @@ def _exchanged(model: Exchange, name: str, system: HybridSystem) -> np.ndarray:
     update = model.initialize(**_starts(name, system))
     solver = "Radau" if system.method == "rosenbrock" else "DOP853"
     importer = Importer(model, update, method=solver, rtol=TOLERANCE, atol=TOLERANCE)
-    told = _told(system)
+    reported = _reported(system)
     for k in range(1, STEPS + 1):
-        if told and (k - 1) * STEP < EVENT_TIME <= k * STEP:
+        if reported and (k - 1) * STEP < EVENT_TIME <= k * STEP:
             importer.advance(EVENT_TIME)
-            importer.happen(told)
+            importer.happen(reported)
         importer.advance(k * STEP)
         importer.record(*_values(model.description))
     return importer.run.values()
@@ -115,8 +115,8 @@ def _cosimulated(made: Any, name: str, system: HybridSystem, factor: float) -> n
     rows = []
     for k in range(STEPS):
         if k * STEP < EVENT_TIME <= (k + 1) * STEP:
-            for told in _told(system):
-                made.event(told.name, stamp=EVENT_TIME, **told.payload)
+            for reported in _reported(system):
+                made.event(reported.name, stamp=EVENT_TIME, **reported.payload)
         made.step(k * STEP, STEP)
         rows.append(made.get(*_values(made.description)))
     return np.array(rows)
@@ -208,7 +208,7 @@ def test_observer_with_balises_follows_its_block(
     now = 0.0
     for instant, position in balises:
         importer.advance(instant)
-        importer.happen([Told(instant, "balise", {"balise_position": position})])
+        importer.happen([Notified(instant, "balise", {"balise_position": position})])
         block.doStep(now, instant - now)
         block.enterEventMode()
         block.setClock([by_name["balise"]], [True])

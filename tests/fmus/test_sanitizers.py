@@ -80,8 +80,8 @@ def test_model_exchange_is_clean(name: str, version: int, exchange: Path, saniti
     states, indicators = (
         str(n or 0) for n in (fmu.description.numberOfContinuousStates, fmu.description.numberOfEventIndicators)
     )
-    given, tried, accepted = map(int, run([str(exchange), str(wiring), states, indicators]).split())
-    assert given > 0
+    stated, tried, accepted = map(int, run([str(exchange), str(wiring), states, indicators]).split())
+    assert stated > 0
     assert 0 < accepted < tried
 
 

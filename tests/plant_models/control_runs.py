@@ -62,8 +62,8 @@ def journey(
             mission.u[0] = seen["position"]
         mission.advance(t)
         plan = outputs(mission)
-        told = {name: value for name, value in estimates(seen, plan).items() if name in controller.inputs}
-        asked = controller.at(t, **told)
+        reported = {name: value for name, value in estimates(seen, plan).items() if name in controller.inputs}
+        asked = controller.at(t, **reported)
         train.u[0] = asked["effort"]
         for i in air:
             train.u[i] = asked["brake_demand"]

@@ -30,13 +30,13 @@ class MassUnderAdrc(HybridSystem):
     default_preset = "train"
     internal_step = 1e-2
 
-    def told(self, x: Any, u: Any) -> Any:
+    def reported(self, x: Any, u: Any) -> Any:
         return ADRC.unpack_inputs(vector(x.speed, u.reference, u.rise))
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-        told = self.told(x, u)
-        effort = ADRC.output(t, x, told, p)["effort"] - x.built_up_brake
-        return {**ADRC.flow(t, x, told, p), "speed": effort / p.true_mass + u.disturbance}
+        reported = self.reported(x, u)
+        effort = ADRC.output(t, x, reported, p)["effort"] - x.built_up_brake
+        return {**ADRC.flow(t, x, reported, p), "speed": effort / p.true_mass + u.disturbance}
 
 
 def test_a_step_is_followed_with_the_designed_pole() -> None:
@@ -89,7 +89,7 @@ def test_a_ramped_drive_keeps_its_rate_and_the_observer_knows_it() -> None:
         parameters = (*controller.parameters, parameter("true_mass", "kg", MASS))
 
         def flow(self, t: Any, x: Any, u: Any, p: Any) -> Any:
-            rates = controller.flow(t, x, self.told(x, u), p)
+            rates = controller.flow(t, x, self.reported(x, u), p)
             return {**rates, "speed": (x.drive_effort - x.built_up_brake) / p.true_mass + u.disturbance}
 
     loop = started(MassUnderRampedDrive(), u0=[25.0, 0.0, 0.0])

@@ -93,9 +93,9 @@ def test_a_known_slope_is_fed_forward_without_waiting_for_an_error() -> None:
     periods=st.integers(1, 40),
 )
 def test_a_change_of_adhesion_level_moves_no_force(error: float, load: float, level: float, periods: int) -> None:
-    told = {"odometer": 10.0, "speed": 10.0, "speed_reference": 10.0 + error, "disturbance_force": load}
+    reported = {"odometer": 10.0, "speed": 10.0, "speed_reference": 10.0 + error, "disturbance_force": load}
     controller = Controller(
-        MDPE, start={**told, "adhesion_force": 400e3, "adhesion_condition": level}, recovery_time=0.0
+        MDPE, start={**reported, "adhesion_force": 400e3, "adhesion_condition": level}, recovery_time=0.0
     )
     controller.at(periods * T)
     mode, before = controller.memory("held_mode"), controller.memory("target_force")
@@ -106,8 +106,8 @@ def test_a_change_of_adhesion_level_moves_no_force(error: float, load: float, le
 
 
 def test_a_change_of_mode_starts_from_the_force_of_the_old_one() -> None:
-    told = {"odometer": 10.0, "speed": 10.2, "speed_reference": 10.0, "disturbance_force": -30e3}
-    controller = Controller(MDPE, start=told)
+    reported = {"odometer": 10.0, "speed": 10.2, "speed_reference": 10.0, "disturbance_force": -30e3}
+    controller = Controller(MDPE, start=reported)
     controller.at(3.0)
     assert controller.memory("held_mode") == 2.0
     before = controller.memory("target_force")
@@ -171,12 +171,12 @@ def test_limits_and_rates_hold_whatever_comes_in(samples: list[dict[str, float]]
     controller = Controller(MDPE, preset, start=samples[0])
     p = MDPE.unpack_parameters(MDPE.start_parameters(preset))
     previous = 0.0
-    for k, told in enumerate(samples):
-        out = controller.at(k * T, **told)
-        fading = 1.0 if preset == "single_mass" else np.clip((told["odometer"] - 0.5) / 1.5, 0.0, 1.0)
+    for k, reported in enumerate(samples):
+        out = controller.at(k * T, **reported)
+        fading = 1.0 if preset == "single_mass" else np.clip((reported["odometer"] - 0.5) / 1.5, 0.0, 1.0)
         available = out["effort_available"]
         lowest = -min(p.electric_brake_limit * fading, available)
-        highest = min(350e3, 4.2e6 / max(told["odometer"], 1e-9), available)
+        highest = min(350e3, 4.2e6 / max(reported["odometer"], 1e-9), available)
         assert lowest - 1e-6 <= out["effort"] <= highest + 1e-6
         nearest = np.clip(previous, lowest, highest)  # what the limits alone would have made of it
         assert abs(out["effort"] - nearest) <= 68e3 * T + 1e-6
@@ -194,8 +194,8 @@ def test_the_demanded_change_of_force_stays_within_what_the_coupler_allows(
     steady = {"odometer": 10.0, "slip": 0.0, "adhesion_condition": 1.0, "coupler_force": other}
     controller = Controller(MDPE, start={**samples[0], **steady})
     previous = 0.0
-    for k, told in enumerate(samples):
-        effort = controller.at(k * T, **{**told, **steady})["effort"]
+    for k, reported in enumerate(samples):
+        effort = controller.at(k * T, **{**reported, **steady})["effort"]
         room = np.clip((250e3 - abs(other)) / 100e3, -1.0, 1.0) * 68e3 * T
         change = effort - previous if other >= 0.0 else previous - effort  # what loads the coupler further
         back = np.clip(-previous if other >= 0.0 else previous, 0.0, 68e3 * T)  # a step towards zero is always allowed
@@ -205,7 +205,7 @@ def test_the_demanded_change_of_force_stays_within_what_the_coupler_allows(
 
 
 def test_the_available_effort_follows_slip_and_recovers_at_its_rates() -> None:
-    told = {
+    reported = {
         "odometer": 10.0,
         "speed": 9.0,
         "speed_reference": 15.0,
@@ -213,7 +213,7 @@ def test_the_available_effort_follows_slip_and_recovers_at_its_rates() -> None:
         "adhesion_force": 60e3,
         "adhesion_condition": 2.0,
     }
-    controller = Controller(MDPE, start=told)
+    controller = Controller(MDPE, start=reported)
     controller.set(held_effort=100e3)
     assert controller.at(T)["effort"] <= 51e3 + 1e-6
     assert controller.at(T)["effort_available"] == pytest.approx(51e3)
@@ -258,9 +258,9 @@ def test_a_locked_wheel_is_no_standing_train() -> None:
 
 
 def test_near_standstill_a_slip_ratio_says_nothing() -> None:
-    told = {"speed_reference": 5.0, "slip": -1.0, "adhesion_force": 5e3}
-    assert Controller(MDPE, start={**told, "speed": 0.9, "odometer": 0.4}).at(0.0)["effort_available"] == 350e3
-    assert Controller(MDPE, start={**told, "speed": 1.1, "odometer": 0.0}).at(0.0)["effort_available"] == 10e3
+    reported = {"speed_reference": 5.0, "slip": -1.0, "adhesion_force": 5e3}
+    assert Controller(MDPE, start={**reported, "speed": 0.9, "odometer": 0.4}).at(0.0)["effort_available"] == 350e3
+    assert Controller(MDPE, start={**reported, "speed": 1.1, "odometer": 0.0}).at(0.0)["effort_available"] == 10e3
 
 
 def test_error_and_power_are_those_of_now() -> None:
@@ -274,7 +274,7 @@ def test_error_and_power_are_those_of_now() -> None:
 @given(samples=st.lists(SAMPLE, min_size=2, max_size=5))
 def test_members_of_a_batch_are_controlled_like_one_alone(samples: list[dict[str, float]]) -> None:
     names = [s.name for s in MDPE.inputs]
-    u = np.array([[told[name] for told in samples] for name in names])
+    u = np.array([[reported[name] for reported in samples] for name in names])
     p = MDPE.start_parameters()
     x = np.repeat(MDPE.start_state()[:, None], len(samples), axis=1)
     together = MDPE.jump_vector("control", 0.0, x, u, p)
@@ -283,6 +283,6 @@ def test_members_of_a_batch_are_controlled_like_one_alone(samples: list[dict[str
 
 
 def test_a_locked_wheel_has_no_electric_brake_so_air_is_asked_for() -> None:
-    told = {"speed": 5.0, "speed_reference": 4.8}
-    assert Controller(MDPE, start={**told, "odometer": 5.0}).at(0.0)["mode"] == 2.0
-    assert Controller(MDPE, start={**told, "odometer": 0.0}).at(0.0)["mode"] == 3.0
+    reported = {"speed": 5.0, "speed_reference": 4.8}
+    assert Controller(MDPE, start={**reported, "odometer": 5.0}).at(0.0)["mode"] == 2.0
+    assert Controller(MDPE, start={**reported, "odometer": 0.0}).at(0.0)["mode"] == 3.0

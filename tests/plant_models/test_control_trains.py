@@ -86,8 +86,8 @@ def under_the_device(*axle_degraded: float) -> tuple[dict[str, float], Controlle
         t = 0.02 * k
         train.advance(t)
         seen = outputs(train)
-        told = {f"axle_speed[{i}]": seen[f"axle_speed[{i}]"] for i in (1, 2, 3, 4)}
-        train.u[0] = device.at(t, **told)["effort"]
+        reported = {f"axle_speed[{i}]": seen[f"axle_speed[{i}]"] for i in (1, 2, 3, 4)}
+        train.u[0] = device.at(t, **reported)["effort"]
     return seen, device
 
 

@@ -37,8 +37,8 @@ def test_a_profile_may_have_more_points_and_keeps_its_presets(count: int) -> Non
         assert p.power_limit == usual.power_limit
         for t in (0.0, 7.0, 44.0, 71.0, 100.0):
             inputs = driver.unpack_inputs(np.zeros(1))
-            told = [d.output(t, REST, inputs, q)["speed_reference"] for d, q in ((driver, p), (DRIVER, usual))]
-            assert told[0] == told[1]
+            reported = [d.output(t, REST, inputs, q)["speed_reference"] for d, q in ((driver, p), (DRIVER, usual))]
+            assert reported[0] == reported[1]
 
 
 @pytest.mark.parametrize("count", [3, 65, 8.5, True])

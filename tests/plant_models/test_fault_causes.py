@@ -79,8 +79,8 @@ def test_a_turned_fault_is_wrong_by_as_much_the_other_way(cause: str, system: st
     if turned is None:
         return  # an input decides the sign
     readings, active = _readings(made, p)
-    others, same = _readings(made, _values(made, **fault | {k: float(np.ravel(v)[0]) for k, v in turned.items()}))
-    assert np.array_equal(active, same)
+    others, equal = _readings(made, _values(made, **fault | {k: float(np.ravel(v)[0]) for k, v in turned.items()}))
+    assert np.array_equal(active, equal)
     assert active.any()
     np.testing.assert_allclose(readings - 20.0, 20.0 - others, atol=1e-12)
     assert np.array_equal(readings != 20.0, active > 0.0)
@@ -115,7 +115,7 @@ def test_a_cause_of_a_users_own_is_a_file(system: str, tmp_path: Path) -> None:
 
 
 def test_what_flows_in_a_cause_flows_in_a_signal_and_its_edges_are_exact() -> None:
-    runtime = started(PLANTS["signal_fault"](cause="given"), None, None, [1.0, 1.0], **{
+    runtime = started(PLANTS["signal_fault"](cause="stated"), None, None, [1.0, 1.0], **{
         "fault_onset[1]": 0.0101, "fault_length[1]": 1.0, "release_time": 0.0502
     })  # fmt: skip
     runtime.advance(0.06)
@@ -192,8 +192,8 @@ def test_an_unknown_cause_a_class_that_is_none_and_losses_of_another_are_refused
         PLANTS["wheel_fault"](cause="fractions:Fraction")
     with pytest.raises(ValueError, match=r"fault_cause:FaultCause is not complete: it has no fault\(\); write it"):
         PLANTS["wheel_fault"](cause="plant_models.faults.fault_cause:FaultCause")
-    with pytest.raises(ValueError, match=r"losses belong to the cause 'lost_samples', got cause 'given'"):
-        PLANTS["signal_fault"](cause="given", losses=True)
+    with pytest.raises(ValueError, match=r"losses belong to the cause 'lost_samples', got cause 'stated'"):
+        PLANTS["signal_fault"](cause="stated", losses=True)
 
 
 def test_faults_of_an_own_name_are_used_where_the_system_has_them_too() -> None:

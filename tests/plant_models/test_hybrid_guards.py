@@ -93,7 +93,7 @@ class _Sized(HybridSystem):
     name = "sized"
     states = (state("x", "1"), state("y", "1"), memory("m", "1"))
     outputs = (output_signal("o", "1"),)
-    events = (TriggeredEvent("tell"),)
+    events = (TriggeredEvent("report"),)
 
     def __init__(self, output: int = 0) -> None:
         self.size = output
@@ -120,7 +120,7 @@ class _FlatJump(_Sized):
 
 
 @pytest.mark.parametrize(
-    ("kind", "where"), [(_FlatFlow, r"flow\(\)"), (_FlatJump, r"jump\('tell'\)")], ids=["flow", "jump"]
+    ("kind", "where"), [(_FlatFlow, r"flow\(\)"), (_FlatJump, r"jump\('report'\)")], ids=["flow", "jump"]
 )
 def test_one_array_of_all_states_is_refused_with_what_to_return(kind: type[_Sized], where: str) -> None:
     """Symbols alike: both kernels say which function of which system it is, and what it is to return."""
@@ -132,7 +132,7 @@ def test_one_array_of_all_states_is_refused_with_what_to_return(kind: type[_Size
     assert "test_hybrid_guards.py:" in str(caught.value)
     kernel = NumpyKernel(kind())
     with pytest.raises(TypeError, match=f"^sized: {where} returns a ndarray; {wanted}"):
-        kernel.step(0.0, 1.0) if kind is _FlatFlow else kernel.jump("tell", 0.0)
+        kernel.step(0.0, 1.0) if kind is _FlatFlow else kernel.jump("report", 0.0)
     TracedKernel(_Sized())
 
 
@@ -144,10 +144,10 @@ def test_an_output_that_is_no_scalar_does_not_write_past_its_place() -> None:
 class _Reader(HybridSystem):
     name = "reader"
     states = (state("x", "1"), memory("m", "1"))
-    outputs = (output_signal("told", "1"),)
+    outputs = (output_signal("reported", "1"),)
     parameters = (parameter("period", "s", 1.0),)
     events = (
-        TriggeredEvent("tell", (_payload("tell_value"),)),
+        TriggeredEvent("report", (_payload("report_value"),)),
         TriggeredEvent("ask"),
         PeriodicEvent("tick", "period"),
     )
@@ -157,20 +157,20 @@ class _Reader(HybridSystem):
         super().__init__()
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"x": u.tell_value if self.reads == "flow" else x.m}
+        return {"x": u.report_value if self.reads == "flow" else x.m}
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"m": u.tell_value if event in ("tell", self.reads) else x.m}
+        return {"m": u.report_value if event in ("report", self.reads) else x.m}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"told": u.tell_value}
+        return {"reported": u.report_value}
 
 
 @pytest.mark.parametrize(("reads", "function"), [("flow", "step"), ("ask", "jump_ask"), ("tick", "jump_tick")])
 def test_payload_is_read_at_its_event_only(reads: str, function: str) -> None:
-    with pytest.raises(ValueError, match=f"reader: {function} reads tell_value, which is known only at the event"):
+    with pytest.raises(ValueError, match=f"reader: {function} reads report_value, which is known only at the event"):
         TracedKernel(_Reader(reads))
-    TracedKernel(_Reader("tell"))
+    TracedKernel(_Reader("report"))
 
 
 # -- time

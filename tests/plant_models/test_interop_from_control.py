@@ -214,10 +214,10 @@ def test_names_become_legal_and_unique() -> None:
     )
     assert [s.name for s in (*system.states, *system.inputs, *system.outputs)] == ["v_1st", "v_lambda", "y_0"]
     assert system.name == "a_b"
-    same = from_state_space(
+    equal = from_state_space(
         control.ss([[-1.0]], [[1.0]], [[1.0]], 0, inputs=["v"], states=["v"], outputs=["v"], name="v")
     )
-    assert [s.name for s in (*same.inputs, *same.outputs, *same.states)] == ["v", "v_output", "v_state"]
+    assert [s.name for s in (*equal.inputs, *equal.outputs, *equal.states)] == ["v", "v_output", "v_state"]
     clash = from_nonlinear_io(
         control.NonlinearIOSystem(
             lambda _t, x, _u, params: vector(-params["seed"] * x[0]),

@@ -198,23 +198,23 @@ def test_no_name_of_a_lazy_room_is_that_of_a_file_in_it() -> None:
 def test_an_expectation_may_be_registered_at_any_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(EXPECTATIONS, "_own", {})
     scenario = Scenario(stop=1.0, step=0.5).add("driver", model="driver")
-    given = {"check": "test_settles", "signal": "driver.effort", "within": 1e9}
+    stated = {"check": "test_settles", "signal": "driver.effort", "within": 1e9}
     with pytest.raises(ValueError, match="expect, number 1: unknown check 'test_settles'"):
-        scenario.set("expect", [given]).table()
+        scenario.set("expect", [stated]).table()
 
     class SettlesExpectation(WindowExpectation):
         check: Literal["test_settles"] = "test_settles"
         signal: str
         within: float
 
-        def judge(self, run: Any) -> list[Any]:
+        def evaluate(self, run: Any) -> list[Any]:
             return []
 
     EXPECTATIONS["test_settles"] = SettlesExpectation
     (found,) = scenario.table().expect
     assert isinstance(found, SettlesExpectation)
     with pytest.raises(ValueError, match="expect, number 1, 'test_settles', within: "):
-        scenario.set("expect", [given | {"within": "x"}]).table()
+        scenario.set("expect", [stated | {"within": "x"}]).table()
 
 
 def test_a_member_that_is_left_out_is_reported_once(plugins: Registry[Any], caplog: pytest.LogCaptureFixture) -> None:

@@ -80,8 +80,8 @@ def test_a_track_lies_along_time_or_position() -> None:
         names = [n for s in train.parameter_signals for n in s.scalar_names]
         p[names.index("zone_from[1]")], p[names.index("zone_to[1]")] = 10.0, 20.0
         x = np.array([[5.0, 15.0], [3.0, 3.0], [5.0, 5.0]])
-        told = train.unpack_inputs(np.zeros((1, 2))), train.unpack_parameters(p)
-        assert list(train.output(12.0, train.unpack_states(x), *told)["adhesion_degraded"]) == expected
+        reported = train.unpack_inputs(np.zeros((1, 2))), train.unpack_parameters(p)
+        assert list(train.output(12.0, train.unpack_states(x), *reported)["adhesion_degraded"]) == expected
 
 
 @pytest.mark.parametrize(("shape", "middle"), [("constant", 0.002), ("linear", 0.005)])

@@ -27,7 +27,7 @@ VOLTAGES = (-1.5, 6.0)
 LOAD = 0.02
 
 
-def told(system: HybridSystem, inputs: Mapping[str, float], parameters: Mapping[str, Any] | None = None) -> Runtime:
+def reported(system: HybridSystem, inputs: Mapping[str, float], parameters: Mapping[str, Any] | None = None) -> Runtime:
     """A runtime that has started."""
     runtime = Runtime(system)
     for name, value in inputs.items():
@@ -66,7 +66,7 @@ def solved() -> np.ndarray:
 
 
 def test_the_motor_solves_its_equations() -> None:
-    motor = told(SynchronousMotor(), in_rotor_frame())
+    motor = reported(SynchronousMotor(), in_rotor_frame())
     motor.advance(0.05)
     np.testing.assert_allclose(motor.x, solved(), rtol=1e-6)  # order 4 at 1e-4 s: (h / 3.6 ms)^4 = 6e-7
 
@@ -78,7 +78,7 @@ def test_a_steady_state_is_the_closed_form() -> None:
     voltages = (-p * speed * L * current, 3.4 * current + p * speed * 0.013)
     assert current == pytest.approx(1.551, abs=5e-4)
     inputs = {"voltage_d": voltages[0], "voltage_q": voltages[1], "load_torque": 0.05}
-    motor = told(SynchronousMotor(), inputs)
+    motor = reported(SynchronousMotor(), inputs)
     motor.advance(2.0)
     now = outputs(motor)
     # e^(-t / 59 ms) has died away; the rest is the internal step's rounding
@@ -110,22 +110,22 @@ def test_three_phases_are_an_equal_motor(frame: str) -> None:
 
 def test_power_is_balanced() -> None:
     """3/2 (v . i) = heat + what is stored in inductances and inertia + friction + load."""
-    motor = told(SynchronousMotor(), in_rotor_frame())
+    motor = reported(SynchronousMotor(), in_rotor_frame())
     stored = lambda x: 0.75 * 0.0121 * (x[0] ** 2 + x[1] ** 2) + 0.5 * 5.9e-6 * x[2] ** 2  # noqa: E731
-    h, given, lost = 1e-5, 0.0, 0.0
+    h, stated, lost = 1e-5, 0.0, 0.0
     before = motor.x.copy()
     for k in range(2000):
         motor.advance((k + 1) * h)
         middle, before = 0.5 * (motor.x + before), motor.x.copy()
-        given += h * 1.5 * (VOLTAGES[0] * middle[0] + VOLTAGES[1] * middle[1])
+        stated += h * 1.5 * (VOLTAGES[0] * middle[0] + VOLTAGES[1] * middle[1])
         lost += h * (1.5 * 3.4 * (middle[0] ** 2 + middle[1] ** 2) + 1e-4 * middle[2] ** 2 + LOAD * middle[2])
-    assert given == pytest.approx(lost + stored(motor.x), rel=1e-4)  # sums of order 2 in h
+    assert stated == pytest.approx(lost + stored(motor.x), rel=1e-4)  # sums of order 2 in h
 
 
 def test_the_euler_form_converges_at_order_one() -> None:
     exact, errors = solved(), []
     for period in (1e-4, 5e-5, 2.5e-5):
-        motor = told(SynchronousMotorEuler(), in_rotor_frame(), {"sample_period": period, **_quiet()})
+        motor = reported(SynchronousMotorEuler(), in_rotor_frame(), {"sample_period": period, **_quiet()})
         motor.advance(0.05)
         errors.append(np.abs(motor.x[:3] / exact[:3] - 1.0).max())
     for coarse, fine in pairwise(errors):
@@ -138,7 +138,7 @@ def _quiet() -> dict[str, float]:
 
 def test_noise_has_the_variances_that_are_stated() -> None:
     system = SynchronousMotorEuler()
-    motor = told(system, {})
+    motor = reported(system, {})
     readings = []
     for k in range(2000):
         before = motor.x[:4].copy()
@@ -150,7 +150,7 @@ def test_noise_has_the_variances_that_are_stated() -> None:
 
 
 def test_stator_readings_are_turned_rotor_currents() -> None:
-    motor = told(SynchronousMotor(frame="stator"), {"voltage_alpha": 4.0, "voltage_beta": 3.0})
+    motor = reported(SynchronousMotor(frame="stator"), {"voltage_alpha": 4.0, "voltage_beta": 3.0})
     motor.advance(0.01)
     now = outputs(motor)
     turned = to_stator(now["current_d"], now["current_q"], now["angle"])
@@ -184,9 +184,9 @@ def test_control_carries_the_load_step() -> None:
 
 
 def test_a_torque_is_asked_for_and_limited() -> None:
-    control = told(FieldOrientedControl(reference="torque"), {"torque_reference": 0.039})
+    control = reported(FieldOrientedControl(reference="torque"), {"torque_reference": 0.039})
     assert outputs(control)["current_reference"] == pytest.approx(1.0)
-    control = told(FieldOrientedControl(reference="torque"), {"torque_reference": -10.0})
+    control = reported(FieldOrientedControl(reference="torque"), {"torque_reference": -10.0})
     assert outputs(control)["current_reference"] == -8.0
 
 

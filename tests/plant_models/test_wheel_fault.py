@@ -13,7 +13,7 @@ from railway_runs import outputs, started
 from plant_models import PLANTS
 from plant_models.hybrid import Runtime
 
-GIVEN = PLANTS["wheel_fault"]()
+STATED = PLANTS["wheel_fault"]()
 DRAWN = PLANTS["wheel_fault"](cause="drawn")
 ADHESION = PLANTS["wheel_fault"](cause="adhesion")
 JAM, SKID = -1.0, 1.0
@@ -44,7 +44,7 @@ def _driven(system: Any, inputs: list[float], **changes: float) -> Runtime:
 def test_the_distance_is_exact_wherever_the_edges_lie(
     speed: float, onset: float, length: float, depth: float, kind: float, step: float
 ) -> None:
-    runtime = _driven(GIVEN, [speed, 0.0, 1e9, 0.0], **_fault(1, onset, length, depth, kind))
+    runtime = _driven(STATED, [speed, 0.0, 1e9, 0.0], **_fault(1, onset, length, depth, kind))
     for k in range(1, round(2.5 / step) + 1):
         runtime.advance(k * step)
     expected = speed * (2.5 + kind * depth * length)
@@ -54,7 +54,7 @@ def test_the_distance_is_exact_wherever_the_edges_lie(
 
 def test_a_jam_and_a_skid_are_what_the_outputs_say() -> None:
     faults = {**_fault(1, 1.0, 0.5, 0.8), **_fault(2, 2.0, 0.5, 0.25, SKID)}
-    runtime = _driven(GIVEN, [20.0, -1.0, 1e9, 0.0], **faults, jam_loss=0.5, skid_loss=0.4)
+    runtime = _driven(STATED, [20.0, -1.0, 1e9, 0.0], **faults, jam_loss=0.5, skid_loss=0.4)
     seen = {}
     for t in (0.99, 1.0, 1.49, 1.5, 2.0, 2.5):
         runtime.advance(t)
@@ -83,7 +83,7 @@ def test_from_the_position_only_faults_feel_the_held_speed() -> None:
 
 
 def test_a_micro_jam_is_in_the_distance_and_in_no_sample() -> None:
-    runtime = _driven(GIVEN, [30.0, 0.0, 1e9, 0.0], **_fault(1, 0.101, 0.003))
+    runtime = _driven(STATED, [30.0, 0.0, 1e9, 0.0], **_fault(1, 0.101, 0.003))
     speeds = []
     for k in range(1, 21):
         runtime.advance(0.05 * k)
@@ -95,7 +95,7 @@ def test_a_micro_jam_is_in_the_distance_and_in_no_sample() -> None:
 @pytest.mark.parametrize(("released_at", "end"), [(1.1, 1.246), (1.9, 2.0), (0.5, 1.146)])
 def test_a_released_brake_frees_a_jammed_wheel_after_the_release_time(released_at: float, end: float) -> None:
     # released before the jam: its clock begins with the jam
-    runtime = _driven(GIVEN, [10.0, 0.0, 1e9, 0.0], **_fault(1, 1.0, 1.0))
+    runtime = _driven(STATED, [10.0, 0.0, 1e9, 0.0], **_fault(1, 1.0, 1.0))
     runtime.advance(released_at)
     runtime.u[3] = 1.0
     runtime.advance(3.0)
@@ -104,7 +104,7 @@ def test_a_released_brake_frees_a_jammed_wheel_after_the_release_time(released_a
 
 
 def test_a_released_brake_does_not_end_a_skid() -> None:
-    runtime = _driven(GIVEN, [10.0, 0.0, 1e9, 1.0], **_fault(1, 1.0, 1.0, 0.5, SKID))
+    runtime = _driven(STATED, [10.0, 0.0, 1e9, 1.0], **_fault(1, 1.0, 1.0, 0.5, SKID))
     runtime.advance(3.0)
     assert outputs(runtime)["wheel_distance"] == pytest.approx(35.0, abs=1e-9)
 
@@ -121,15 +121,17 @@ def test_a_released_brake_does_not_end_a_skid() -> None:
 )
 def test_faults_that_are_none_are_refused_in_words(changes: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        started(GIVEN, None, **changes)
+        started(STATED, None, **changes)
 
 
 def test_faults_that_touch_do_not_overlap_and_unused_ones_never_do() -> None:
-    started(GIVEN, None, **_fault(1, 1.0, 1.0), **_fault(2, 2.0, 1.0), **_fault(3, 1.5, 0.0))
+    started(STATED, None, **_fault(1, 1.0, 1.0), **_fault(2, 2.0, 1.0), **_fault(3, 1.5, 0.0))
 
 
 def test_unknown_causes_and_counts_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"Unknown cause 'luck'; choose one of: adhesion, .*given, .*or write file.py"):
+    with pytest.raises(
+        ValueError, match=r"Unknown cause 'luck'; choose one of: adhesion, .*stated, .*or write file.py"
+    ):
         PLANTS["wheel_fault"](cause="luck")
     with pytest.raises(ValueError, match="fault_count must be at least 1, got 0"):
         PLANTS["wheel_fault"](fault_count=0)

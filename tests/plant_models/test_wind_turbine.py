@@ -114,8 +114,8 @@ def _plain_turbine(_: float, x: np.ndarray, wind: float, torque: float, pitch: f
 
 def test_the_turbine_moves_as_scipy_says() -> None:
     system = WindTurbine()
-    given = {"wind_speed": 13.0, "torque_reference": 20e3, "pitch_reference": 4.0}
-    runtime = _runtime(system, "without_noise", **given, torque_offset=500.0, internal_step=2e-3)
+    stated = {"wind_speed": 13.0, "torque_reference": 20e3, "pitch_reference": 4.0}
+    runtime = _runtime(system, "without_noise", **stated, torque_offset=500.0, internal_step=2e-3)
     start = runtime.x[:10].copy()
     runtime.start(0.0)
     runtime.advance(1.0)
@@ -124,11 +124,11 @@ def test_the_turbine_moves_as_scipy_says() -> None:
     ]
     # RK4 errs by (h / tau)^4 / 120 of what decays, 1e-6 for the converter; it decays, and what it moved does not
     assert runtime.x[:4] == pytest.approx(solved[:4], rel=1e-6)
-    told = _outputs(runtime)
-    assert told["generator_torque"] == pytest.approx(20.5e3, rel=1e-9)
-    assert told["measured_power"] == pytest.approx(0.98 * solved[1] * 20.5e3, rel=1e-6)
-    assert told["measured_pitch[4]"] == pytest.approx(solved[5], rel=1e-6)
-    assert told["drive_train_unstable"] == 0.0
+    reported = _outputs(runtime)
+    assert reported["generator_torque"] == pytest.approx(20.5e3, rel=1e-9)
+    assert reported["measured_power"] == pytest.approx(0.98 * solved[1] * 20.5e3, rel=1e-6)
+    assert reported["measured_pitch[4]"] == pytest.approx(solved[5], rel=1e-6)
+    assert reported["drive_train_unstable"] == 0.0
 
 
 def test_the_internal_step_damps_the_shaft_as_its_comment_says() -> None:
@@ -176,9 +176,9 @@ def test_the_controller_is_the_plain_loop() -> None:
         pitch = min(max(pitch + 4.0 * error + (0.01 - 4.0) * before, 0.0), 90.0) if zone == 3 else 0.0
         before = error
         torque = 1.2170801318882305 * speed**2 if zone == 2 else 4.8e6 / (0.98 * speed)
-        told = _outputs(runtime)
-        assert (told["zone"], told["pitch_reference"]) == (zone, pytest.approx(pitch, abs=1e-9))
-        assert told["torque_reference"] == pytest.approx(torque, rel=1e-12)
+        reported = _outputs(runtime)
+        assert (reported["zone"], reported["pitch_reference"]) == (zone, pytest.approx(pitch, abs=1e-9))
+        assert reported["torque_reference"] == pytest.approx(torque, rel=1e-12)
         zones.append(zone)
     assert np.count_nonzero(np.diff(zones)) == 2
     assert pitch == 0.0
@@ -220,13 +220,13 @@ def test_a_case_expects_the_alarm_of_its_own_fault() -> None:
         "report.detection", raw["cases"]["F1"]["report"]["detection"]
     )
     outcome = scenario.run()
-    assert [judged.passed for judged in outcome.expectations] == [True]
+    assert [evaluated.passed for evaluated in outcome.expectations] == [True]
     # rows are 1 s apart, and yet the instants are exact: those at which the fault and its alarm go on and off
     assert len(outcome.result.time) < 40
-    (told,) = outcome.result.summary["fault_detection"]
-    assert (told["start_delays"], told["end_delays"]) == ([0.0], [pytest.approx(0.04)])
+    (reported,) = outcome.result.summary["fault_detection"]
+    assert (reported["start_delays"], reported["end_delays"]) == ([0.0], [pytest.approx(0.04)])
     missed = scenario.set("diagnosis.pitch_difference_limit", 1e3).run()
-    assert [judged.passed for judged in missed.expectations] == [False]
+    assert [evaluated.passed for evaluated in missed.expectations] == [False]
 
 
 def test_a_run_with_the_printed_drive_train_is_warned() -> None:

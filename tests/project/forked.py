@@ -101,11 +101,11 @@ class Forked:
         assert self._server.stdout is not None
         self._server.stdin.write(json.dumps(order) + "\n")
         self._server.stdin.flush()
-        answer = json.loads(self._server.stdout.readline())
-        self.spent += answer["spent"]
+        response = json.loads(self._server.stdout.readline())
+        self.spent += response["spent"]
         written = Path(order["output"]).read_text(encoding="utf-8", errors="replace")
         loaded = Path(order["output"] + LOADED_BY).read_text(encoding="utf-8").splitlines()
-        return Done(answer["returncode"], written, answer["spent"], loaded)
+        return Done(response["returncode"], written, response["spent"], loaded)
 
 
 def serve() -> None:
@@ -119,8 +119,8 @@ def serve() -> None:
         if child == 0:
             run(json.loads(line))
         _, status, used = os.wait4(child, 0)
-        answer = {"returncode": os.waitstatus_to_exitcode(status), "spent": used.ru_utime + used.ru_stime}
-        print(json.dumps(answer), flush=True)
+        response = {"returncode": os.waitstatus_to_exitcode(status), "spent": used.ru_utime + used.ru_stime}
+        print(json.dumps(response), flush=True)
 
 
 def run(order: Mapping[str, Any]) -> None:

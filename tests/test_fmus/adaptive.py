@@ -21,7 +21,7 @@ def adaptive_fmu(
     forgets: bool = False,
     declared: float | None = None,
 ) -> Path:
-    """An oscillator, ``p = MIDDLE + sin(W t)``: outputs `position`, `speed` and `told`, the tolerance it was told (0:
+    """An oscillator, ``p = MIDDLE + sin(W t)``: outputs `position`, `speed` and `reported`, the tolerance it got (0:
     none).
 
     Args:
@@ -33,7 +33,7 @@ def adaptive_fmu(
         TIME,
         Variable("position", 1, "output", unit="m"),
         Variable("speed", 2, "output", unit="m/s"),
-        Variable("told", 3, "output"),
+        Variable("reported", 3, "output"),
     ]
     defines: dict[str, Define] = {
         "W": W,

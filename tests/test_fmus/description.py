@@ -90,9 +90,9 @@ def description_xml(model: Model, version: Version) -> str:
     return {1: _fmi1, 2: _fmi2, 3: _fmi3}[version](model)
 
 
-def attributes(**given: Any) -> str:
+def attributes(**stated: Any) -> str:
     """Attributes of an element; None is left out."""
-    return "".join(f" {key}={quoteattr(_text(value))}" for key, value in given.items() if value is not None)
+    return "".join(f" {key}={quoteattr(_text(value))}" for key, value in stated.items() if value is not None)
 
 
 def _text(value: Any) -> str:

@@ -56,8 +56,9 @@ def typed_fmu(folder: Path, name: str = "typed", *, version: Version = 3) -> Pat
 
     FMI 3.0: also the arrays ``u_vector`` [n], ``u_matrix`` [2, n], ``u_pair_<type>`` [2] and ``y_...``; structural
     parameter ``n``. FMI 1.0 and 2.0: Float64 as Real, Int32 as Integer, Boolean, String, Enumeration. FMI 1.0:
-    ``y_same`` and ``y_negated`` are an alias and a negated alias of ``y_float64``; the input ``u_negated`` is a negated
-    alias of the internal ``w``: setting 2 makes w = -2. All inputs start at zero, empty or false, the enumeration at 1.
+    ``y_equal`` and ``y_negated`` are an alias and a negated alias of ``y_float64``; the input ``u_negated`` is a
+    negated alias of the internal ``w``: setting 2 makes w = -2. All inputs start at zero, empty or false, the
+    enumeration at 1.
     """
     variables = [TIME]
     if version == 3:
@@ -65,7 +66,7 @@ def typed_fmu(folder: Path, name: str = "typed", *, version: Version = 3) -> Pat
     variables += _side(version, "u", FIRST_U) + _side(version, "y", FIRST_Y)
     if version == 1:
         variables += [
-            Variable("y_same", FIRST_Y, "output", depends=("u_float64",), alias="alias"),
+            Variable("y_equal", FIRST_Y, "output", depends=("u_float64",), alias="alias"),
             Variable("y_negated", FIRST_Y, "output", depends=("u_float64",), alias="negatedAlias"),
             Variable("w", ONLY, "local"),
             Variable("u_negated", ONLY, "input", start=-0.0, alias="negatedAlias"),

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Literal, Self
 import numpy as np
 
 from cosim.errors import ScenarioError
+from cosim.expectations.evaluated import Evaluated, at, with_unit
+from cosim.expectations.evaluated_run import EvaluatedRun, span
 from cosim.expectations.expectation import PairExpectation
-from cosim.expectations.judged import Judged, at, with_unit
-from cosim.expectations.judged_run import JudgedRun, span
 from cosim.expectations.sizes import bounded, difference
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class BoundExpectation(PairExpectation):
     def prepare(self, before: Before) -> Self:
         """The three signals exist, and have one dimension."""
         super().prepare(before)
-        before.demand_same_dimension(self.signal, self.bound)
+        before.demand_equal_dimension(self.signal, self.bound)
         if self.bound.endswith(AS_PRINTED):
             raise ScenarioError(
                 f"'bound': {self.bound} is what its source prints, which errors may exceed; take error_bound or "
@@ -39,7 +39,7 @@ class BoundExpectation(PairExpectation):
             )
         return self
 
-    def judge(self, run: JudgedRun) -> list[Judged]:
+    def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """The largest share of the bound that the error takes; it is broken where that exceeds 1."""
         error = np.abs(difference(run.recorded(self.signal), run.recorded(self.reference)))
         bound, window, unit = run.recorded(self.bound), run.window(self.start, self.end), run.unit(self.signal)

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from cosim.errors import ScenarioError, nearest
 from cosim.evaluation.summary_entries import certified_gap, mapping_entry, number_entry
+from cosim.expectations.evaluated import Evaluated
+from cosim.expectations.evaluated_run import EvaluatedRun, NotRecordedError
 from cosim.expectations.expectation import Expectation
-from cosim.expectations.judged import Judged
-from cosim.expectations.judged_run import JudgedRun, NotRecordedError
 from cosim.toml_table import Name
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
 
 SEEN = "largest_gap_seen"
-_NEVER_CERTIFIED = 'certificates = "ignore" leaves nothing to judge; remove that line'
+_NEVER_CERTIFIED = 'certificates = "ignore" leaves nothing to evaluate; remove that line'
 
 
 class CertificateExpectation(Expectation):
@@ -36,27 +36,27 @@ class CertificateExpectation(Expectation):
                 raise ScenarioError(f"{name!r} receives no telegrams; {nearest(name, before.receivers)}")
         return self
 
-    def judge(self, run: JudgedRun) -> list[Judged]:
+    def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """Certified for the longest gap that was expected, where that was known, and for the longest that occurred."""
         certificates = mapping_entry(run.result, "certificates")
         certified = [name for name, entry in certificates.items() if isinstance(entry, Mapping) and SEEN in entry]
         names = certified if self.of is None else [self.of] if isinstance(self.of, str) else list(self.of)
         if not names:
-            raise NotRecordedError("nothing to judge: no observer of this run has a certificate")
+            raise NotRecordedError("nothing to evaluate: no observer of this run has a certificate")
         return [_certificate(name, certificates.get(name), run) for name in names]
 
 
-def _certificate(observer: str, entry: Any, run: JudgedRun) -> Judged:
+def _certificate(observer: str, entry: Any, run: EvaluatedRun) -> Evaluated:
     name = f"certificate of {observer}"
     if not isinstance(entry, Mapping):
-        return Judged(name, "certificate", passed=False, unit="s", text="nothing to judge: it has no certificate")
+        return Evaluated(name, "certificate", passed=False, unit="s", text="nothing to evaluate: it has no certificate")
     limit, seen = certified_gap(entry), number_entry(entry, SEEN)
     expected, bound = number_entry(entry, "max_gap"), "any gap" if limit is None else f"gaps up to {limit:.4g} s"
     wanted = "longer gaps" if expected is None else f"gaps of {expected:.4g} s"
     values: dict[str, Any] = {"limit": float("inf") if limit is None else limit, "unit": "s"}
     if entry.get("holds") is False:
         text = f"certified for {bound}, expected were {wanted}"
-        return Judged(
+        return Evaluated(
             name,
             "certificate",
             passed=False,
@@ -66,10 +66,10 @@ def _certificate(observer: str, entry: Any, run: JudgedRun) -> Judged:
         )
     before = f"expected were {wanted}" if expected is not None else "what to expect was not known before the run"
     if seen is None:
-        return Judged(
+        return Evaluated(
             name, "certificate", passed=False, text=f"certified for {bound}, {before}; no gap was seen", **values
         )
     passed = (limit is None or seen <= limit) and run.result.failure is None
     text = f"certified for {bound}, {before}, {seen:.4g} s occurred"
     text += "; not reached: the run ended early" if run.result.failure is not None else ""
-    return Judged(name, "certificate", passed=passed, measured=seen, text=text, **values)
+    return Evaluated(name, "certificate", passed=passed, measured=seen, text=text, **values)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
+from cosim.expectations.evaluated import Evaluated
+from cosim.expectations.evaluated_run import EvaluatedRun, span
 from cosim.expectations.expectation import LimitedExpectation, PairExpectation
-from cosim.expectations.judged import Judged
-from cosim.expectations.judged_run import JudgedRun, span
-from cosim.expectations.sizes import difference, judge_sizes
+from cosim.expectations.sizes import difference, evaluate_sizes
 
 
 class DifferenceExpectation(PairExpectation, LimitedExpectation):
@@ -15,9 +15,9 @@ class DifferenceExpectation(PairExpectation, LimitedExpectation):
 
     check: Literal["difference"]
 
-    def judge(self, run: JudgedRun) -> list[Judged]:
+    def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """One signal minus another."""
         error = difference(run.recorded(self.signal), run.recorded(self.reference))
         window = run.window(self.start, self.end)
         name = f"difference of {self.signal} and {self.reference}"
-        return judge_sizes(name + "{}" + span(self.start, self.end), self, window, error, run.unit(self.signal))
+        return evaluate_sizes(name + "{}" + span(self.start, self.end), self, window, error, run.unit(self.signal))

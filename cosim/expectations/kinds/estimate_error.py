@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, Self
 
 from cosim.errors import ScenarioError
+from cosim.expectations.evaluated import Evaluated
+from cosim.expectations.evaluated_run import EvaluatedRun, NotRecordedError, span
 from cosim.expectations.expectation import LimitedExpectation
-from cosim.expectations.judged import Judged
-from cosim.expectations.judged_run import JudgedRun, NotRecordedError, span
-from cosim.expectations.sizes import difference, judge_sizes
+from cosim.expectations.sizes import difference, evaluate_sizes
 from cosim.toml_table import Name
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class ErrorExpectation(LimitedExpectation):
     check: Literal["speed_error", "position_error", "slip_error", "adhesion_force_error"]
     of: Name | list[Name] | None = None
 
-    def first_judged(self, before: Before) -> float:
+    def first_evaluated(self, before: Before) -> float:
         """The start of the evaluation [s]."""
         return max(before.start, before.report.evaluate_after)
 
@@ -48,7 +48,7 @@ class ErrorExpectation(LimitedExpectation):
             before.demand_output(observer, output)
         return self
 
-    def judge(self, run: JudgedRun) -> list[Judged]:
+    def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """Errors of the estimates of each observer, from the start of the evaluation on where no window is given."""
         role, output, unit = ERRORS[self.check]
         true = getattr(run.spec, role)
@@ -59,5 +59,5 @@ class ErrorExpectation(LimitedExpectation):
         for observer in [self.of] if isinstance(self.of, str) else self.of or run.spec.observers:
             error = difference(run.recorded(f"{observer}.{output}"), run.recorded(true))
             name = f"{self.check} of {observer}"
-            found += judge_sizes(name + "{}" + span(self.start, self.end), self, window, error, unit)
+            found += evaluate_sizes(name + "{}" + span(self.start, self.end), self, window, error, unit)
         return found

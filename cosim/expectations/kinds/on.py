@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from cosim.expectations.evaluated import Evaluated, written
+from cosim.expectations.evaluated_run import EvaluatedRun, span
 from cosim.expectations.expectation import IndicatorExpectation
 from cosim.expectations.indicator_levels import ROUNDING, first_on, threshold_of
-from cosim.expectations.judged import Judged, given
-from cosim.expectations.judged_run import JudgedRun, span
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
@@ -36,9 +36,9 @@ class OnExpectation(IndicatorExpectation):
         before.demand_within("before", self.before)
         return super().prepare(before)
 
-    def judge(self, run: JudgedRun) -> list[Judged]:
+    def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """On at `before` at the latest; an indicator that is on when the window begins is on in time."""
-        name = f"{self.signal} on by {given(self.before)} s{span(self.start, None)}"
+        name = f"{self.signal} on by {written(self.before)} s{span(self.start, None)}"
         values, threshold = run.recorded(self.signal), threshold_of(self.signal, self.threshold)
         start = run.start if self.start is None else self.start
         first = first_on(run.result.time, values, threshold, start)
@@ -48,8 +48,8 @@ class OnExpectation(IndicatorExpectation):
             first > self.before + ROUNDING * max(1.0, abs(self.before)) and window.reached < self.before
         ):
             text = window.unreached if window.reached < self.before else "never on"
-            return [Judged(name, passed=False, text=f"{text} (threshold {given(threshold)})", **common)]
+            return [Evaluated(name, passed=False, text=f"{text} (threshold {written(threshold)})", **common)]
         passed = first <= self.before + ROUNDING * max(1.0, abs(self.before))
         already = " already, when the window begins" if first == start else ""
-        text = f"on at {given(first, 's')}{already}, expected by {given(self.before, 's')}"
-        return [Judged(name, passed=passed, measured=first, when=first, text=text, **common)]
+        text = f"on at {written(first, 's')}{already}, expected by {written(self.before, 's')}"
+        return [Evaluated(name, passed=passed, measured=first, when=first, text=text, **common)]

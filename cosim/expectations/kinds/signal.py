@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import model_validator
 
+from cosim.expectations.evaluated import Evaluated
+from cosim.expectations.evaluated_run import EvaluatedRun, span
 from cosim.expectations.expectation import WindowExpectation
-from cosim.expectations.judged import Judged
-from cosim.expectations.judged_run import JudgedRun, span
 from cosim.expectations.sizes import bounded
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class SignalExpectation(WindowExpectation):
         before.unit(self.signal)
         return self
 
-    def judge(self, run: JudgedRun) -> list[Judged]:
+    def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """Smallest, largest and last value of a signal."""
         values, unit, window = run.recorded(self.signal), run.unit(self.signal), run.window(self.start, self.end)
         shown, when = values[window.rows], window.time

@@ -8,9 +8,9 @@ from pydantic import model_validator
 
 from cosim.errors import ScenarioError, nearest
 from cosim.evaluation.event_counts import USED
+from cosim.expectations.evaluated import Evaluated
+from cosim.expectations.evaluated_run import EvaluatedRun, TimeWindow, span
 from cosim.expectations.expectation import Count, WindowExpectation
-from cosim.expectations.judged import Judged
-from cosim.expectations.judged_run import JudgedRun, TimeWindow, span
 from cosim.results.result_data import BaliseRecord
 from cosim.toml_table import Name
 
@@ -62,7 +62,7 @@ class TelegramsExpectation(WindowExpectation):
             raise ScenarioError(f"{self.of!r} receives no telegrams; {nearest(self.of, before.receivers)}")
         return self
 
-    def judge(self, run: JudgedRun) -> list[Judged]:
+    def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """Counts of the telegrams stamped within the window: of the track as a whole, and at each receiver."""
         window = run.window(self.start, self.end)
         within = [e for e in run.result.events if window.holds(e.stamp)]
@@ -71,8 +71,8 @@ class TelegramsExpectation(WindowExpectation):
         )
         where = span(self.start, self.end)
         if not within:
-            text = f"nothing to judge: no balise was passed{where or ' in this run'}"
-            return [Judged("telegrams", "telegrams", passed=False, measured=0.0, text=text)]
+            text = f"nothing to evaluate: no balise was passed{where or ' in this run'}"
+            return [Evaluated("telegrams", "telegrams", passed=False, measured=0.0, text=text)]
         found = []
         for key in _OF_THE_TRACK:
             if getattr(self, key) is not None:
@@ -90,7 +90,7 @@ class TelegramsExpectation(WindowExpectation):
         return found
 
 
-def _at_most(name: str, limit: int, chosen: list[BaliseRecord], window: TimeWindow) -> Judged:
+def _at_most(name: str, limit: int, chosen: list[BaliseRecord], window: TimeWindow) -> Evaluated:
     passed = len(chosen) <= limit
     named = ", ".join(f"{e.identity or 'without name'} at {e.stamp:.6g} s" for e in chosen[:NAMES_SHOWN])
     more = ", ..." if len(chosen) > NAMES_SHOWN else ""
@@ -100,7 +100,7 @@ def _at_most(name: str, limit: int, chosen: list[BaliseRecord], window: TimeWind
     return _counted(name, passed and not window.broken, chosen, limit, when, text)
 
 
-def _at_least(name: str, limit: int, chosen: list[BaliseRecord], window: TimeWindow) -> Judged:
+def _at_least(name: str, limit: int, chosen: list[BaliseRecord], window: TimeWindow) -> Evaluated:
     """Enough telegrams are enough, also where the run ended early."""
     passed = len(chosen) >= limit
     text = f"{len(chosen)}, expected at least {limit}" + (
@@ -109,5 +109,5 @@ def _at_least(name: str, limit: int, chosen: list[BaliseRecord], window: TimeWin
     return _counted(name, passed, chosen, limit, float("nan"), text)
 
 
-def _counted(name: str, passed: bool, chosen: list[BaliseRecord], limit: int, when: float, text: str) -> Judged:
-    return Judged(name, "telegrams", passed, float(len(chosen)), float(limit), when=when, text=text)
+def _counted(name: str, passed: bool, chosen: list[BaliseRecord], limit: int, when: float, text: str) -> Evaluated:
+    return Evaluated(name, "telegrams", passed, float(len(chosen)), float(limit), when=when, text=text)

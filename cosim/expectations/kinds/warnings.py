@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Literal
 
 from cosim.evaluation.summary_entries import list_entry
+from cosim.expectations.evaluated import Evaluated
+from cosim.expectations.evaluated_run import EvaluatedRun
 from cosim.expectations.expectation import Count, Expectation
-from cosim.expectations.judged import Judged
-from cosim.expectations.judged_run import JudgedRun
 
 _WARNINGS_SHOWN = 3
 
@@ -18,7 +18,7 @@ class WarningsExpectation(Expectation):
     check: Literal["warnings"]
     at_most: Count = 0
 
-    def judge(self, run: JudgedRun) -> list[Judged]:
+    def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """The number of warnings of the run."""
         warnings = [str(text) for text in list_entry(run.result, "warnings")]
         passed = len(warnings) <= self.at_most
@@ -30,4 +30,4 @@ class WarningsExpectation(Expectation):
         if run.result.failure is not None:
             text += "; not reached: the run ended early" if passed else ""
             passed = False
-        return [Judged("warnings", "warnings", passed, float(len(warnings)), float(self.at_most), text=text)]
+        return [Evaluated("warnings", "warnings", passed, float(len(warnings)), float(self.at_most), text=text)]

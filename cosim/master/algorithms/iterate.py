@@ -87,7 +87,7 @@ class Sensitivity:
 def _passage(plan: Plan, place: int, inner: Sequence[LoopLink]) -> _Passage | None:
     """None where nothing passes through a component at once that comes from the loop and goes back into it."""
     step = plan.steps[place]
-    component, given = step.component, {link.column for link in inner if link.source == place}
+    component, stated = step.component, {link.column for link in inner if link.source == place}
     table = declared_feedthrough(component)
     used = {name for names in table.values() for name in names}
     taken = [
@@ -97,7 +97,7 @@ def _passage(plan: Plan, place: int, inner: Sequence[LoopLink]) -> _Passage | No
         and _is_real(component, n := step.inputs.names[k.place])
         and _variable(component, n) in used
     ]
-    names = {column: plan.signals[column].name.removeprefix(f"{component.name}.") for column in given}
+    names = {column: plan.signals[column].name.removeprefix(f"{component.name}.") for column in stated}
     columns = sorted(
         c for c, name in names.items() if _is_real(component, name) and table.get(_variable(component, name))
     )

@@ -93,8 +93,8 @@ def _comparison_error_figure(signal: SignalComparison, ax: Axes | None = None) -
         band = f"allowed: {number(allowed)}"
         ax.axhspan(-allowed, allowed, color=AMBER, alpha=0.55, linewidth=0, zorder=0.5, label=band)
     ax.axhline(0.0, color=MARK, linewidth=0.7, zorder=1)
-    looks = {"color": BLUE, "linewidth": 1.1, "label": "result minus reference"}
-    curve(ax, curves.error_time, error, (-limit, limit), **looks)
+    drawn = {"color": BLUE, "linewidth": 1.1, "label": "result minus reference"}
+    curve(ax, curves.error_time, error, (-limit, limit), **drawn)
     if np.isfinite(signal.max_error_at) and not signal.passed:
         ax.axvline(signal.max_error_at, color=ALARM, linewidth=0.8, linestyle=(0, (2, 2)), label="largest")
     ax.set_ylim(-limit, limit)
@@ -232,14 +232,14 @@ def _draw_tube(
         high_time, high = thin(time[near], np.clip(upper[near], *reach))
         shapes.append(np.column_stack([np.append(low_time, high_time[::-1]), np.append(low, high[::-1])]))
     if shapes:
-        look: dict[str, Any] = {
+        surface: dict[str, Any] = {
             "facecolor": AMBER,
             "edgecolor": AMBER,
             "linewidth": edge,
             "alpha": 0.55,
             "zorder": 0.5,
         }
-        ax.add_collection(PolyCollection(shapes, label="tolerance tube", **look), autolim=False)
+        ax.add_collection(PolyCollection(shapes, label="tolerance tube", **surface), autolim=False)
 
 
 def _mark_findings(ax: Axes, signal: SignalComparison, begin: float, end: float) -> None:

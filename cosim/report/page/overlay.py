@@ -71,20 +71,20 @@ def layout_note(runs: Sequence[OverlayRun]) -> str:
     passed = [{e.identity: e for e in run.result.events if e.kind != "false"} for run in runs]
     if not any(passed):
         return ""
-    other = [run.label for run, own in zip(runs[1:], passed[1:], strict=True) if not _same_layout(passed[0], own)]
+    other = [run.label for run, own in zip(runs[1:], passed[1:], strict=True) if not _equal_layout(passed[0], own)]
     if not other:
         return "All runs pass the same balises, at the same places or at the same instants."
     return f"{', '.join(other)} passed other balises than {runs[0].label}, or elsewhere."
 
 
-def _same_layout(a: Mapping[str, BaliseRecord], b: Mapping[str, BaliseRecord]) -> bool:
+def _equal_layout(a: Mapping[str, BaliseRecord], b: Mapping[str, BaliseRecord]) -> bool:
     """Whether the same balises were passed where they were (a layout by distance) or when they were (one by
     instants).
     """
     if a.keys() != b.keys():
         return False
-    same_places = all(abs(a[name].true_position - b[name].true_position) <= _PLACE for name in a)
-    return same_places or all(abs(a[name].stamp - b[name].stamp) <= INSTANT for name in a)
+    equal_places = all(abs(a[name].true_position - b[name].true_position) <= _PLACE for name in a)
+    return equal_places or all(abs(a[name].stamp - b[name].stamp) <= INSTANT for name in a)
 
 
 def _properties(run: OverlayRun) -> dict[str, str]:
@@ -345,9 +345,9 @@ def _notes(runs: Sequence[OverlayRun]) -> list[str]:
     """What the reader must know before comparing."""
     notes = []
     first = runs[0]
-    judged = [run.label for run in runs[1:] if list(run.own_spec.phases) != list(first.own_spec.phases)]
-    if judged:
-        notes.append(f"{', '.join(judged)} named other phases; all are judged over those of {first.label}.")
+    evaluated = [run.label for run in runs[1:] if list(run.own_spec.phases) != list(first.own_spec.phases)]
+    if evaluated:
+        notes.append(f"{', '.join(evaluated)} named other phases; all are judged over those of {first.label}.")
     late = [run.label for run in runs[1:] if run.own_spec.evaluate_after != first.own_spec.evaluate_after]
     if late:
         notes.append(f"{', '.join(late)} were to be evaluated from another instant on; that of {first.label} is used.")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry
-from cosim.expectations.judged import Judged
+from cosim.expectations.evaluated import Evaluated
 from cosim.report.live.live_page import LivePage
 from cosim.report.live.render import live_page
 from cosim.report.page.derived_curves import derived_curves
@@ -85,13 +85,13 @@ def run_page(result: Result, spec: ReportSpec) -> LivePage:
     """
     rows = len(result.time)
     derived = derived_curves(result, spec) if rows else []
-    judged = [Judged.from_data(data) for data in list_entry(result, "expectations")]
+    evaluated = [Evaluated.from_data(data) for data in list_entry(result, "expectations")]
     statuses = observer_statuses(result, spec) if rows else []
     marks = run_marks(result, spec) if rows else []
     description = result.summary.get("description")
     return LivePage(
         title=spec.title,
-        verdict=run_verdict(result, spec, judged, statuses),
+        verdict=run_verdict(result, spec, evaluated, statuses),
         cards=run_statements(result, spec, statuses),
         finding=largest_finding(result, spec, statuses, marks),
         lead=description if isinstance(description, str) else "",
@@ -99,5 +99,5 @@ def run_page(result: Result, spec: ReportSpec) -> LivePage:
         panels=[*run_panels(result, spec), *(panel for _, panel in derived)],
         marks=marks,
         settled=spec.evaluate_after,
-        sections=run_sections(result, spec, judged),
+        sections=run_sections(result, spec, evaluated),
     )

@@ -14,7 +14,7 @@ from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.result_warnings import all_warnings
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, statement
-from cosim.expectations.judged import Judged
+from cosim.expectations.evaluated import Evaluated
 from cosim.report.live.live_page import Folded, Part, Rows, Section
 from cosim.report.page.run_tables import run_tables
 from cosim.results.result import Result
@@ -36,19 +36,19 @@ _PHASES = (
 )
 
 
-def run_sections(result: Result, spec: ReportSpec, judged: Sequence[Judged]) -> list[Section]:
+def run_sections(result: Result, spec: ReportSpec, evaluated: Sequence[Evaluated]) -> list[Section]:
     """All sections of the page of a run; those without content leave nothing behind.
 
     Args:
         result: the run. spec: roles, labels, phases. judged: expectations.
     """
-    tables = run_tables(result, spec, judged)
+    tables = run_tables(result, spec, evaluated)
     seeds = len(mapping_entry(result, "seed_study").get("seeds", []))
     in_c = "in C were not timed" if was_compiled(result) else "were timed in one call of 64"
     notes = list(dict.fromkeys(map(str, [*spec.notes, *list_entry(result, "notes")])))
     explained = [Folded(f"{name}: what was checked", [text]) for name, text in tables["explained"].items()]
     return [
-        *_first(result, spec, judged, tables["expectations"]),
+        *_first(result, spec, evaluated, tables["expectations"]),
         Section(
             "Over several seeds", _with(f"Maximal speed error in m/s over {seeds} seeds of the run.", tables["seeds"])
         ),
@@ -72,12 +72,12 @@ def run_sections(result: Result, spec: ReportSpec, judged: Sequence[Judged]) -> 
     ]
 
 
-def _first(result: Result, spec: ReportSpec, judged: Sequence[Judged], expectations: Table) -> list[Section]:
+def _first(result: Result, spec: ReportSpec, evaluated: Sequence[Evaluated], expectations: Table) -> list[Section]:
     """What is wrong, and the errors."""
     metrics = (
         phase_metrics(result, spec) if spec.true_speed or spec.true_position else []
     )  # a turbine has no such errors
-    unmet = [f"{one.name}: {one.text}" for one in judged if not one.passed]
+    unmet = [f"{one.name}: {one.text}" for one in evaluated if not one.passed]
     warnings: list[Part] = [*all_warnings(result, spec)]
     sources = any(m.published is not None or m.independent is not None for m in metrics)
     text = "Estimate minus true value."

@@ -38,11 +38,11 @@ def _ending(result: Result) -> Card:
 
 
 def _expectations(result: Result) -> Card | None:
-    judged = [entry for entry in list_entry(result, "expectations") if isinstance(entry, Mapping)]
-    if not judged:
+    evaluated = [entry for entry in list_entry(result, "expectations") if isinstance(entry, Mapping)]
+    if not evaluated:
         return None
-    met = sum(entry.get("passed") is True for entry in judged)
-    return "Expectations", f"{met} of {len(judged)} met", "", "good" if met == len(judged) else "bad"
+    met = sum(entry.get("passed") is True for entry in evaluated)
+    return "Expectations", f"{met} of {len(evaluated)} met", "", "good" if met == len(evaluated) else "bad"
 
 
 def _error(spec: ReportSpec, statuses: Sequence[ObserverStatus], quantity: Quantity, unit: str) -> Card | None:
@@ -79,15 +79,15 @@ def _certificates(result: Result) -> Card | None:
     known = [
         entry.get("holds") for entry in mapping_entry(result, "certificates").values() if isinstance(entry, Mapping)
     ]
-    judged = [str(holds) for holds in known if holds is not None]
-    if not judged:
+    evaluated = [str(holds) for holds in known if holds is not None]
+    if not evaluated:
         return None
-    holding = judged.count("True")
+    holding = evaluated.count("True")
     return (
         "Certificates",
-        f"{holding} of {len(judged)} hold",
+        f"{holding} of {len(evaluated)} hold",
         "for the gaps expected",
-        "good" if holding == len(judged) else "doubt",
+        "good" if holding == len(evaluated) else "doubt",
     )
 
 

@@ -18,7 +18,7 @@ from cosim.evaluation.roles import label
 from cosim.evaluation.seed_table import seed_table
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
-from cosim.expectations.judged import Judged, judged_table
+from cosim.expectations.evaluated import Evaluated, evaluated_table
 from cosim.report.page.phases import phases_table
 from cosim.results.result import Result
 from fmus.tables.numbers import DASH, error_number, number
@@ -50,15 +50,15 @@ _COMPONENT_COLUMNS = (
 MESSAGES_SHOWN = 100
 
 
-def run_tables(result: Result, spec: ReportSpec, judged: Sequence[Judged]) -> dict[str, Any]:
+def run_tables(result: Result, spec: ReportSpec, evaluated: Sequence[Evaluated]) -> dict[str, Any]:
     """Tables that follow from a run and its roles, by their names in the template.
 
     Args:
-        result: the run. spec: roles and labels. judged: expectations.
+        result: the run. spec: roles and labels. evaluated: expectations.
     """
     certificates, explained = _certificates(result, spec)
     return {
-        "expectations": judged_table(judged),
+        "expectations": evaluated_table(evaluated),
         "telegrams": telegrams_table(count_events(result.events).outcomes, spec.labels),
         "seeds": _seeds(result),
         "phases": phases_table(phase_details(result, spec), spec),

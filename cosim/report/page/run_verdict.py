@@ -13,12 +13,12 @@ import numpy as np
 
 from cosim.evaluation.balise_gaps import GapErrors, gap_errors
 from cosim.evaluation.event_counts import accepted_stamps
-from cosim.evaluation.metrics import judged_size
+from cosim.evaluation.metrics import evaluated_size
 from cosim.evaluation.result_warnings import all_warnings, largest_tolerable
 from cosim.evaluation.roles import Quantity, estimation_error, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import mapping_entry, number_entry
-from cosim.expectations.judged import Judged
+from cosim.expectations.evaluated import Evaluated
 from cosim.report.live.first_sentence import first_sentence
 from cosim.report.live.live_page import Mark, Verdict
 from cosim.report.page.run_curves import QUANTITIES
@@ -70,7 +70,7 @@ def observer_statuses(result: Result, spec: ReportSpec) -> list[ObserverStatus]:
 
     def largest(observer: str, quantity: Quantity) -> float:
         error = estimation_error(result, spec, observer, quantity)
-        return nan if error is None else judged_size(result.time[settled], error[settled]).max_abs
+        return nan if error is None else evaluated_size(result.time[settled], error[settled]).max_abs
 
     found = []
     for observer in spec.observers:
@@ -86,7 +86,7 @@ def _within(gaps: GapErrors, observer: str) -> float:
 
 
 def run_verdict(
-    result: Result, spec: ReportSpec, judged: Sequence[Judged], statuses: Sequence[ObserverStatus]
+    result: Result, spec: ReportSpec, evaluated: Sequence[Evaluated], statuses: Sequence[ObserverStatus]
 ) -> Verdict:
     """What a run comes to, in a sentence or two.
 
@@ -98,24 +98,26 @@ def run_verdict(
         stop = number_entry(result.summary, "stop")
         end = f"at {reached} s" + (f" of {number(stop)} s" if stop is not None else "")
         return Verdict(f"The run ended early, {end}: {first_sentence(result.failure)[0]}", "bad")
-    unmet = [one for one in judged if not one.passed]
+    unmet = [one for one in evaluated if not one.passed]
     speed = recorded(result, spec.true_speed)
     moves = speed is None or not len(speed) or bool(np.any(~(np.abs(speed) <= 0.01)))
     if not moves:
         text = f"The train never moves up to {reached} s: this run says nothing of its observers."
-        return Verdict(_with_unmet(unmet, judged, text), "bad" if unmet else "doubt")
+        return Verdict(_with_unmet(unmet, evaluated, text), "bad" if unmet else "doubt")
     text, good = _of_observers(spec, statuses) if statuses else (_without_observers(result, reached), True)
     mood = "bad" if unmet or (statuses and all(s.fails for s in statuses)) else "good" if good else "doubt"
     others = len(all_warnings(result, spec)) - sum(s.fails for s in statuses)
     if others > 0 and mood == "good":
         mood, text = "doubt", f"{text} {others} {'warning' if others == 1 else 'warnings'}: see below."
-    return Verdict(_with_unmet(unmet, judged, text), mood)  # type: ignore[arg-type]  # one of the moods
+    return Verdict(_with_unmet(unmet, evaluated, text), mood)  # type: ignore[arg-type]  # one of the moods
 
 
-def _with_unmet(unmet: Sequence[Judged], judged: Sequence[Judged], text: str) -> str:
+def _with_unmet(unmet: Sequence[Evaluated], evaluated: Sequence[Evaluated], text: str) -> str:
     if not unmet:
-        return f"{text} All {len(judged)} expectations are met." if judged else text
-    return f"{len(unmet)} of {len(judged)} expectations are not met, first: {unmet[0].name} ({unmet[0].text}). {text}"
+        return f"{text} All {len(evaluated)} expectations are met." if evaluated else text
+    return (
+        f"{len(unmet)} of {len(evaluated)} expectations are not met, first: {unmet[0].name} ({unmet[0].text}). {text}"
+    )
 
 
 def _without_observers(result: Result, reached: str) -> str:

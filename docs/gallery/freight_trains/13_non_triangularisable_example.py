@@ -47,8 +47,8 @@ def main() -> None:
         seeds = SEEDS.get(hold, (0,))
         runs = [followed(NAME, "estimated", seed, noise=0.3, hold=hold) for seed in seeds]
         largest, rms = np.median([final_quarter(*run) for run in runs], axis=0)
-        judged = f", median of {len(seeds)} seeds" if len(seeds) > 1 else ""
-        words = f"15 to 20 s, noise up to 0.3 held {1e3 * hold:g} ms{judged}"
+        evaluated = f", median of {len(seeds)} seeds" if len(seeds) > 1 else ""
+        words = f"15 to 20 s, noise up to 0.3 held {1e3 * hold:g} ms{evaluated}"
         sheet.add(f"rms of the error norm, {words}", "1", published, rms, BANDWIDTH)
         sheet.add(f"largest error norm, {words}", "1", None, largest, BANDWIDTH)
         t, found = runs[0]

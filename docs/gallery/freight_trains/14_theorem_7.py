@@ -36,9 +36,9 @@ TRAIN_WHY = (
 
 def designed(model: str, gap: float, eta: float, printed: bool = False, **options: Any) -> Theorem7Design | None:
     """The design with free or with the printed gains, or None where there is none."""
-    given = {"gains": PRINTED[model].arrays(find_takagi_sugeno_model(model))} if printed else {}
+    stated = {"gains": PRINTED[model].arrays(find_takagi_sugeno_model(model))} if printed else {}
     try:
-        return design_theorem7(model, gap, eta, **given, **options)
+        return design_theorem7(model, gap, eta, **stated, **options)
     except InfeasibleDesign:
         return None
 

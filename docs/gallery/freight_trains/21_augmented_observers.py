@@ -76,17 +76,17 @@ def journey() -> dict[str, np.ndarray]:
 
 def fixes(way: dict[str, np.ndarray], preset: str, drift_time: float) -> np.ndarray:
     """Positions told by the receiver every 0.1 s."""
-    receiver, told = SystemRunner(Gps(), preset, drift_time=drift_time), []
+    receiver, reported = SystemRunner(Gps(), preset, drift_time=drift_time), []
     for k in range(0, len(way["time"]), 10):
         receiver.set("u", position=way["position"][k])
         if k == 0:
             receiver.runtime.start(0.0)
         receiver.runtime.advance(way["time"][k])
-        told.append(receiver.outputs()["gps_position"])
-    return np.array(told)
+        reported.append(receiver.outputs()["gps_position"])
+    return np.array(reported)
 
 
-def followed(observer: SystemRunner, way: dict[str, np.ndarray], told: np.ndarray) -> np.ndarray:
+def followed(observer: SystemRunner, way: dict[str, np.ndarray], reported: np.ndarray) -> np.ndarray:
     """Speed and coupler force (with gravity) of an observer, shape (rows, 2)."""
     observer.set("x", estimated_speed=0.5)
     rows = np.empty((len(way["time"]), 2))
@@ -96,7 +96,7 @@ def followed(observer: SystemRunner, way: dict[str, np.ndarray], told: np.ndarra
         if k == 0:
             observer.runtime.start(0.0)
         if k % 10 == 0:
-            observer.set("u", gps_position=told[k // 10])
+            observer.set("u", gps_position=reported[k // 10])
             observer.runtime.trigger("gps")
         values = observer.outputs()
         rows[k] = values["speed"], values["coupler_force"]
@@ -110,13 +110,13 @@ def main() -> None:
     true = way["coupler_force"] + WEIGHT * UPHILL
     figure, (speeds, forces) = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
     for words, (preset, drift_time) in RECEIVERS.items():
-        told = fixes(way, preset, drift_time)
+        reported = fixes(way, preset, drift_time)
         for theta, label in GAINS.items():
             for family, make, gains in (
                 ("high gain", AugmentedHighGainCdo, {"theta_gps": theta}),
                 ("Takagi-Sugeno", AugmentedTakagiSugenoCdo, binomial(theta)),
             ):
-                found = followed(SystemRunner(make(), n_axles=4.0, **gains), way, told)
+                found = followed(SystemRunner(make(), n_axles=4.0, **gains), way, reported)
                 error = 3.6 * np.abs(found[:, 0] - way["speed"])
                 late = way["time"] > 10.0
                 name = f"mean speed error, {family}, {label}, {words}"

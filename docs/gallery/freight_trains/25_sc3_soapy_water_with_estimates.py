@@ -21,11 +21,11 @@ if __name__ == "__main__":
     outcome = run("freight_sc3")
     found = slide(outcome)
     for words, published, measured in (("onset", "35", found.onset), ("end", "42", found.end)):
-        told = f"{published} s, from an unknown origin"
+        reported = f"{published} s, from an unknown origin"
         sheet.add(
             f"{words} of slip, after the departure",
             "s",
-            told,
+            reported,
             instant(measured),
             f"{NOT_PRINTED}; {SEEDS}",
             repeats=0.05,

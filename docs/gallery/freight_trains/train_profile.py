@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
-from shared.line import SAME
+from shared.line import EQUAL_WITHIN
 from shared.sheet import Sheet
 from shared.shipped import run
 
@@ -53,7 +53,9 @@ def add_largest_errors(
         for zone, (start, end) in ZONES.items():
             largest = float(error[(t >= start) & (t <= end)].max())
             words = f"{prefix}{label}: largest speed error, {zone}"
-            sheet.add(words, "m/s", published.get(zone), largest, NO_DATA, repeats=(repeats or {}).get(name, SAME))
+            sheet.add(
+                words, "m/s", published.get(zone), largest, NO_DATA, repeats=(repeats or {}).get(name, EQUAL_WITHIN)
+            )
 
 
 def _figure(outcome: Outcome) -> plt.Figure:

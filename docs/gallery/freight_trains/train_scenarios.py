@@ -18,7 +18,7 @@ from cosim import Outcome, Scenario
 
 Array = NDArray[np.float64]
 SOURCE = "Bouchama 2024, section 4.5, Table 4.4, Figures 4.18-4.37"
-DEPARTURE, TARGET, JUDGED_FROM, EXCESSIVE = 20.0, 850.0, 2.8, 0.15  # [s], [m], [m/s], [1]
+DEPARTURE, TARGET, EVALUATED_FROM, EXCESSIVE = 20.0, 850.0, 2.8, 0.15  # [s], [m], [m/s], [1]
 WATER, EFFORT_LIMIT = (20.0, 250.0), 350e3  # [m], [N]
 AXLES = range(1, 5)
 OBSERVERS = ("multirate_cdo", "takagi_sugeno_cdo")
@@ -107,7 +107,7 @@ def indicated(outcome: Outcome) -> tuple[float, float]:
 def lowest_limit(outcome: Outcome) -> float:
     """Share of the locomotive's effort that the MDPE controller allows itself at least on the slippery rail [1]."""
     place, speed = outcome["train.position"], outcome["train.speed"]
-    on_water = (place > WATER[0]) & (place < WATER[1]) & (speed > JUDGED_FROM)
+    on_water = (place > WATER[0]) & (place < WATER[1]) & (speed > EVALUATED_FROM)
     return float(outcome["controller.effort_available"][on_water].min() / EFFORT_LIMIT)
 
 
@@ -174,4 +174,4 @@ def _draw(column: Iterable[plt.Axes], outcome: Outcome) -> None:
 
 
 def _slip(wheels: Array, speed: Array) -> Array:
-    return np.where(speed > JUDGED_FROM, (wheels - speed) / np.maximum(wheels, JUDGED_FROM), 0.0)
+    return np.where(speed > EVALUATED_FROM, (wheels - speed) / np.maximum(wheels, EVALUATED_FROM), 0.0)

@@ -20,14 +20,14 @@ SHARE = "S09 of the figures in words: v (1 - T / Dt), up to one pulse of the win
 MICRO = "the thesis says that micro-jams give a slow bias, and no number"
 
 
-def run(cause: str = "given", **faults: Any) -> Any:
+def run(cause: str = "stated", **faults: Any) -> Any:
     """A wheel at constant speed beside balises every 200 m, with an odometer that is integrated and reset there."""
     s = cosim.Scenario(stop=40.0, step=0.05, certificates="ignore")
     train = {"train_speed": SPEED, "davis_a": 0.0, "davis_b": 0.0, "davis_c": 0.0}
-    given = {name: values + [0.0] * (4 - len(values)) for name, values in faults.items() if isinstance(values, list)}
-    kinds = {"fault_kind": [k or -1.0 for k in given["fault_kind"]]} if "fault_kind" in given else {}
+    stated = {name: values + [0.0] * (4 - len(values)) for name, values in faults.items() if isinstance(values, list)}
+    kinds = {"fault_kind": [k or -1.0 for k in stated["fault_kind"]]} if "fault_kind" in stated else {}
     s.add("train", model="longitudinal_train", parameters=train)
-    s.add("wheel", model="wheel_fault", options={"cause": cause}, parameters={**faults, **given, **kinds})
+    s.add("wheel", model="wheel_fault", options={"cause": cause}, parameters={**faults, **stated, **kinds})
     s.add("odometer", model="pulse_odometer", options={"count_from": "wheel_distance"})
     s.add("reset", observer="odometer_reset")
     s.connect("train.wheel_speed -> wheel.speed", "wheel.wheel_speed -> odometer.wheel_speed")

@@ -38,8 +38,8 @@ def main() -> None:
     effort = plan_stop(30.0, 100.0, drag_rate=0.1, brake_coefficient=0.1).effort
     cycle = FaultCycle(matrix, COLUMN, effort, 0.0, 0.5, 0.503, 0.646, 0.65)
     difference = np.abs(cycle.error(1.0, START) - integrated(cycle, 1.0)).max()
-    same = "yes" if difference < 1e-9 else f"no: {difference:.0e}"
-    sheet.add("(3.28) agrees with integration to 1e-9", "", None, same, DIGITS, independent="yes")
+    equal = "yes" if difference < 1e-9 else f"no: {difference:.0e}"
+    sheet.add("(3.28) agrees with integration to 1e-9", "", None, equal, DIGITS, independent="yes")
     mapped = np.abs(cycle.over_the_cycle(START) - cycle.error(cycle.recovery, START)).max()
     sheet.add(
         "(3.33) agrees with (3.28) at t01", "", None, "yes" if mapped < 1e-12 else "no", DIGITS, independent="yes"

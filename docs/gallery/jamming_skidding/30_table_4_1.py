@@ -43,10 +43,10 @@ def designs(sheet: Sheet) -> None:
         words = f"m {m:g} 1/s, alpha {alpha:g}"
         try:
             found = design_proposition_4_1(train_vertices([W1]), C, m, alpha)
-        except InfeasibleBounds as told:
+        except InfeasibleBounds as reported:
             sheet.add(f"beta, {words}", "1", "infeasible", "infeasible", independent="infeasible")
-            sheet.add(f"least alpha that is feasible, {words}", "1", None, told.nearest_alpha or 0.0, NEAREST)
-            sheet.add(f"largest m that is feasible, {words}", "1/s", None, told.nearest_m or 0.0, NEAREST)
+            sheet.add(f"least alpha that is feasible, {words}", "1", None, reported.nearest_alpha or 0.0, NEAREST)
+            sheet.add(f"largest m that is feasible, {words}", "1/s", None, reported.nearest_m or 0.0, NEAREST)
         else:
             assert cell is not None
             sheet.add(f"beta, {words}", "1", cell[0], found.beta, independent=BETA[m, alpha])

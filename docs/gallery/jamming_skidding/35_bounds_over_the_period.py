@@ -38,9 +38,9 @@ def main() -> None:
         sheet.add(f"error at the next sample within the bound, {words}", "1", "yes", "yes" if held else "no", WHY)
         axes[1].semilogy(found.instants, found.bounds, color=line.get_color(), label=f"bound, {words}")
         axes[1].semilogy(found.instants, found.errors, color=line.get_color(), ls="--", lw=1)
-    same = "nearly" if apart < 0.05 else "no"
+    equal = "nearly" if apart < 0.05 else "no"
     sheet.add(
-        "DMO and CDO have the same average bound", "1", "nearly", same, "set C is linear: the same observer twice"
+        "DMO and CDO have the same average bound", "1", "nearly", equal, "set C is linear: the same observer twice"
     )
     axes[0].set(xlabel="sampling period [s]", ylabel="average bound of the error [m/s]", title="dotted: CDO")
     axes[1].set(xlabel="time [s]", ylabel="bound and error at the samples [m/s]", title="period 0.2 s; dashed: error")

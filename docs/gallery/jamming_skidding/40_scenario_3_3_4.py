@@ -25,7 +25,7 @@ def main() -> None:
     figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
     run = trains(CASE, 100)
     t = PERIOD * np.arange(at_samples(run.v).shape[1])
-    judged = (t > 6.0) & (at_samples(run.v)[0] > 1.0)
+    evaluated = (t > 6.0) & (at_samples(run.v)[0] > 1.0)
     for noise in NOISES:
         read = readings(run, None, noise, np.random.default_rng(0), False)
         found = {
@@ -34,7 +34,7 @@ def main() -> None:
             )
             for rules, four in (("printed", 0.0), ("printed", 1.0), ("repaired", 0.0))
         }
-        largest = {key: np.abs(out["residual"][:, judged]).max(axis=1) for key, out in found.items()}
+        largest = {key: np.abs(out["residual"][:, evaluated]).max(axis=1) for key, out in found.items()}
         published = "< 0.9" if noise == 0.02 else None
         for key, label, why in (
             (("printed", 0.0), "reading held", PLAN),
@@ -49,7 +49,7 @@ def main() -> None:
                 repeats=0.05,
                 independent=INDEPENDENT[noise] if key[0] == "printed" else None,
             )
-        alarms = found["repaired", 0.0]["odometer_fault"][:, judged]
+        alarms = found["repaired", 0.0]["odometer_fault"][:, evaluated]
         sheet.add(
             f"share of runs with a false alarm, repaired rules, noise {noise:g} m/s",
             "%",
@@ -60,12 +60,12 @@ def main() -> None:
             independent="none",
         )
         if noise in RULE_4:
-            told = found["printed", 1.0]["odometer_fault"][:, judged] > 0.5
+            reported = found["printed", 1.0]["odometer_fault"][:, evaluated] > 0.5
             sheet.add(
                 f"false samples with rule 4, noise {noise:g} m/s",
                 "1",
                 None,
-                float(told.sum(axis=1).mean()),
+                float(reported.sum(axis=1).mean()),
                 COUNTED,
                 repeats=0.2,
                 independent=RULE_4[noise],

@@ -50,7 +50,7 @@ def main() -> None:
     read = readings(run, jams, NOISE, np.random.default_rng(0), False)
     position, t = at_samples(run.p), PERIOD * np.arange(read.shape[1])
     alone = odometer_error(position, read, 200.0)
-    told = {
+    reported = {
         label: observe(CASE, run, read, rules, aggregated=False, estimated_speed=44.1, **values)
         for label, (rules, values) in RULES.items()
     }
@@ -60,7 +60,7 @@ def main() -> None:
         what = f"at the balise after a jam at {onset:g} s of {length:g} s"
         sheet.add(f"true minus odometer position {what}", "m", None, -alone[member, row], SPEED, independent=sensor)
         for label, why in zip(RULES, (SMALLER, LATE, AT_ONCE), strict=True):
-            error = position[member, row] - told[label]["position"][member, row]
+            error = position[member, row] - reported[label]["position"][member, row]
             published = STORY if (onset, label) == (16.0, "printed rules") else None
             sheet.add(
                 f"true minus estimated position {what}, {label}",
@@ -71,7 +71,7 @@ def main() -> None:
                 repeats=0.2,
                 independent=None if label == "repaired rules" else observer,
             )
-        for label, found in told.items():
+        for label, found in reported.items():
             fault = found["odometer_fault"][member] > 0.5
             begins = abs(t[fault & (t >= onset - 1e-9)][0] - onset)
             published_delay = 0.4 if label == "printed rules" else None
@@ -95,7 +95,7 @@ def main() -> None:
         off = position[member, row] - out["position"][member, row]
         sheet.add(f"true minus estimated position, {what}, repaired rules", "m", None, float(off), TURNED, repeats=0.2)
     axis.plot(t, alone[1], label="odometer")
-    for label, out in told.items():
+    for label, out in reported.items():
         shown = np.clip(out["position"][1] - position[1], -12.0, 12.0)
         axis.plot(t, shown, label=f"observer, {label}")
     axis.axvspan(16.0, 19.0, color="0.9", zorder=0)

@@ -58,8 +58,8 @@ def main() -> None:
                 fast = readings(run, jams.turned, NOISE, rng, True)
                 on = (observe(case, run, fast, with_balises=False, noise=NOISE)["odometer_fault"] > 0.5) & moving
                 share = 100.0 * float(on[np.arange(MEMBERS), last].mean())
-                told = f"{name.replace('jam', 'skid')}: fault told before rest, repaired rules"
-                sheet.add(told, "%", None, share, TURNED, repeats=0.3)
+                reported = f"{name.replace('jam', 'skid')}: fault told before rest, repaired rules"
+                sheet.add(reported, "%", None, share, TURNED, repeats=0.3)
             if number == 1:
                 axis.plot(t, np.clip(found["speed"][0], 0.0, 60.0), label=f"{rules} rules")
         if number == 1:

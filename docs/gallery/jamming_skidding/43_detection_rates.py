@@ -32,8 +32,8 @@ def main() -> None:
         read = readings(run, jams, NOISE, rng, True)
         fast = readings(run, jams.turned, NOISE, rng, True)
         for rules, sign in (("repaired", ""), ("printed", ""), ("repaired", " of skids")):
-            told = observe(CASES[case], run, fast if sign else read, rules, noise=NOISE)
-            v = verdicts(run, jams, told["odometer_fault"])
+            reported = observe(CASES[case], run, fast if sign else read, rules, noise=NOISE)
+            v = verdicts(run, jams, reported["odometer_fault"])
             missed, hours = float((~v.found).mean()), float(v.moving.sum()) / 3600.0
             why = TURNED if sign else PRINTED if rules == "printed" else SMALL if case == "LS" else REAL
             printed = 0.0 if rules == "printed" else None

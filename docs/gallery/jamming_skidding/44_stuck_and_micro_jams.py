@@ -28,8 +28,8 @@ def main() -> None:
         for with_balises, how in ((True, "balises every 200 m"), (False, "no balises")):
             found, what = observe(CASE, run, stuck, with_balises=with_balises, noise=NOISE), f"stuck 10 % {side}, {how}"
             error = np.abs(found["position"] - position)
-            told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
-            sheet.add(f"{what}: fault told", "% of the time", None, told, STUCK, repeats=0.1)
+            reported = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
+            sheet.add(f"{what}: fault told", "% of the time", None, reported, STUCK, repeats=0.1)
             sheet.add(f"{what}: largest position error", "m", None, error[:, window].max(), STUCK, repeats=0.2)
             axis.plot(t[window], error[0, window], "-" if jams is low else "--", label=f"{side}, {how}")
         alone = np.abs(odometer_error(position, stuck, 200.0))
@@ -40,10 +40,12 @@ def main() -> None:
     for sign, side in ((-1.0, "micro-jams"), (1.0, "micro-skids")):
         micro = exact * (1.0 + sign * 0.02 * np.clip((t - 10.0) / 10.0, 0.0, 1.0))  # 4 ms in 0.2 s, at first none
         found, what = observe(CASE, run, micro, noise=NOISE), f"{side} of 4 ms in 0.2 s"
-        told = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
+        reported = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
         error = np.abs(found["position"] - position)[:, window].max()
         alone = np.abs(odometer_error(position, micro, 200.0))[:, window].max()
-        sheet.add(f"{what}: fault told", "% of the time", "not detectable" if sign < 0.0 else None, f"{told:.0f}", OURS)
+        sheet.add(
+            f"{what}: fault told", "% of the time", "not detectable" if sign < 0.0 else None, f"{reported:.0f}", OURS
+        )
         sheet.add(f"{what}: largest position error", "m", None, error, OURS, repeats=0.1)
         sheet.add(f"{what}: odometer reset at balises", "m", None, alone, OURS, repeats=0.1)
     axis.set(xlabel="time [s]", ylabel="position error [m]")

@@ -43,10 +43,10 @@ def main() -> None:
             sheet.add(f"{what}: {found.labels[name]}", "m", None, errors[place[origin]], WHY, repeats=0.05)
     for name, errors in found.errors.items():
         seconds = found.running_time(name)
-        told = found.labels[name]
-        sheet.add(f"largest of {len(found.gaps)} gaps: {told}", "m", None, largest(errors), WHY, repeats=0.05)
+        reported = found.labels[name]
+        sheet.add(f"largest of {len(found.gaps)} gaps: {reported}", "m", None, largest(errors), WHY, repeats=0.05)
         in_time = largest(seconds[~np.isnan(seconds)])
-        sheet.add(f"largest running time: {told}", "s", None, in_time, WHY, repeats=0.05)
+        sheet.add(f"largest running time: {reported}", "s", None, in_time, WHY, repeats=0.05)
     other = turned(Scenario.load("amsterdam_utrecht")).run(warn=lambda _text: None)
     for name, errors in gap_errors(other.result, other.spec).errors.items():
         what = f"jams and skids turned, largest of {len(found.gaps)} gaps: {found.labels[name]}"

@@ -74,9 +74,9 @@ def main() -> None:
         rows = result.time >= start
         t, true = result.time[rows], result["train.position"][rows]
         jams = [jam for jam in intervals(result.time, result["wheel.active"]) if jam[0] >= start]
-        told = [one for one in intervals(result.time, result[f"{OBSERVER}.odometer_fault"]) if one[1] > start]
-        missed = sum(not any(c <= b + GRACE and d > a for c, d in told) for a, b in jams)
-        false = sum(not any(c <= b + GRACE and d > a for a, b in jams) for c, d in told)
+        reported = [one for one in intervals(result.time, result[f"{OBSERVER}.odometer_fault"]) if one[1] > start]
+        missed = sum(not any(c <= b + GRACE and d > a for c, d in reported) for a, b in jams)
+        false = sum(not any(c <= b + GRACE and d > a for a, b in jams) for c, d in reported)
         largest = {}
         for name, colour, label in ((ODOMETER, "tab:orange", "odometer"), (OBSERVER, "tab:blue", "observer")):
             error = result[f"{name}.position"][rows] - true
@@ -84,7 +84,7 @@ def main() -> None:
             axis.plot(t, error, color=colour, label=label)
         for a, b in jams:
             axis.axvspan(a, b, color="0.88", zorder=0)
-        for c, d in told:
+        for c, d in reported:
             axis.axvspan(c, d, ymax=0.04, color="tab:red")
         what, threshold = f"Fig. {number}, {figure.case}", figure.threshold
         own = "" if threshold is None else f", eps {threshold:g} m/s"

@@ -25,8 +25,8 @@ FEW = SEEDS[:3]
 def main() -> None:
     """Errors of the printed finals in the other states, and what changes them or does not."""
     sheet = Sheet(__file__, "What the error of the currents does not show", "Allaoui 2024, Figs. 3.10-3.13, (4.42)")
-    told = np.array([errors(seed, of_rows(list(FINALS)), STATES[2:]) for seed in SEEDS]).mean(axis=0)
-    for (row, (speed, angle)), (of_speed, of_angle) in zip(FINALS.items(), told, strict=True):
+    reported = np.array([errors(seed, of_rows(list(FINALS)), STATES[2:]) for seed in SEEDS]).mean(axis=0)
+    for (row, (speed, angle)), (of_speed, of_angle) in zip(FINALS.items(), reported, strict=True):
         sheet.add(f"MSE of the speed, {row}", "rad2/s2", None, of_speed, CURVES, repeats=0.03, independent=speed)
         sheet.add(f"MSE of the angle, {row}", "rad2", None, of_angle, DEAD, repeats=0.05, independent=angle)
 

@@ -34,12 +34,12 @@ def main() -> None:
         sheet.add(f"change by: {name}", "1", None, change, WHY, repeats=0.2, independent=round(published, 3))
     straight = in_run(drive(0))
     table = drive(0).table()
-    same = {True}
+    equal = {True}
     for order in (("filter", "control", "motor", "cycle"), ("control", "filter", "cycle", "motor")):
         listed = {name: table.components[name].model_dump(by_alias=True, exclude_unset=True) for name in order}
         again = drive(0, components=listed, connections=[str(line) for line in table.connections][::-1])
-        same.add(bool((in_run(again) == straight).all()))
-    text = "the same to the bit" if same == {True} else "differs"
+        equal.add(bool((in_run(again) == straight).all()))
+    text = "the same to the bit" if equal == {True} else "differs"
     sheet.add("two other orders of listing", "1", None, text, ORDER)
     jacobi = in_run(drive(0, master__algorithm="jacobi"))
     ratio = jacobi[0] / straight[0]
@@ -60,10 +60,10 @@ def _slipped(seed: int, voltages: int, currents: int) -> float:
     """Cost with inputs that are so many samples late [A2]."""
     late = {"voltage_d": voltages, "voltage_q": voltages}
     late |= {"measured_current_d": currents, "measured_current_q": currents}
-    told = replay(seed).run(STATES[:2], late=late)[0]
+    reported = replay(seed).run(STATES[:2], late=late)[0]
     true = np.stack([recording(seed)[f"motor.{state}"] for state in STATES[:2]], axis=1)
     compared = true[: len(true) - currents]
-    return float(np.mean((told[currents:] - compared)[1:] ** 2, axis=0).sum())
+    return float(np.mean((reported[currents:] - compared)[1:] ** 2, axis=0).sum())
 
 
 if __name__ == "__main__":

@@ -76,14 +76,14 @@ def main() -> None:
 
 def _run(seed: int, changes: Changes) -> Outcome:
     scenario = cosim.Scenario.load("sensorless_drive")
-    given = dict(changes)
-    if isinstance(filter_table := given.pop("observer", None), dict):
+    stated = dict(changes)
+    if isinstance(filter_table := stated.pop("observer", None), dict):
         table = scenario.table()
         others = {n: t.model_dump(by_alias=True, exclude_unset=True) for n, t in table.components.items()}
         scenario.set("components", {**others, "observer": filter_table})
-    if "case" in given:
-        scenario.set("case", given.pop("case"))
-    for name, value in given.items():
+    if "case" in stated:
+        scenario.set("case", stated.pop("case"))
+    for name, value in stated.items():
         scenario.set(name, value)
     return scenario.set("motor.seed", float(seed)).run()
 

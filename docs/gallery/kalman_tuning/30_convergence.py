@@ -40,8 +40,8 @@ def main() -> None:
     true = np.stack([run[f"motor.{name}"] for name in CURRENTS], axis=1)
 
     def cost(candidates: np.ndarray) -> np.ndarray:
-        given = {"process_variance": candidates[:, :4], "measurement_variance": candidates[:, 4:]}
-        errors = (replay.run(CURRENTS, given, members=len(candidates)) - true)[:, 1:]
+        stated = {"process_variance": candidates[:, :4], "measurement_variance": candidates[:, 4:]}
+        errors = (replay.run(CURRENTS, stated, members=len(candidates)) - true)[:, 1:]
         return np.asarray((errors**2).mean(axis=1).sum(axis=1))
 
     figure, axes = plt.subplots(figsize=(8.0, 3.8), layout="constrained")
@@ -54,8 +54,8 @@ def main() -> None:
         ]
         medians = np.median([search.costs for search in found], axis=0)
         for place, iteration in enumerate(ITERATIONS):
-            told = f"{label}, iteration {iteration}"
-            sheet.add(told, "A2", published[place], float(medians[iteration]), WHY, independent=independent[place])
+            reported = f"{label}, iteration {iteration}"
+            sheet.add(reported, "A2", published[place], float(medians[iteration]), WHY, independent=independent[place])
         axes.plot(medians, label=label)
     sheet.add("variances of the noise itself", "A2", None, floor, WHY, independent=0.0147)
     axes.axhline(floor, color="black", linewidth=0.8, label="variances of the noise")

@@ -85,10 +85,10 @@ def estimates(name: str, cell: Cell, forces: np.ndarray, readings: np.ndarray) -
     """Estimates of a filter that is told the noises as they are, shape (N, n)."""
     observer, run, n = _filter(name, cell.plant), _run(name, cell.plant, len(forces)), readings.shape[1] * 2
     p = observer.start_parameters()
-    told = {"process_covariance": cell.process * np.eye(n)}
-    told["measurement_covariance"] = np.diag(np.broadcast_to(cell.measurement, (n // 2,)))
+    reported = {"process_covariance": cell.process * np.eye(n)}
+    reported["measurement_covariance"] = np.diag(np.broadcast_to(cell.measurement, (n // 2,)))
     names = scalar_names(observer.parameter_signals)
-    for key, matrix in told.items():
+    for key, matrix in reported.items():
         first = names.index(f"{key}[1]")
         p[first : first + matrix.size] = matrix.ravel()
     p[names.index("sample_period")] = cell.period
@@ -165,9 +165,9 @@ def compare(sheet: Sheet, cells: Mapping[str, tuple[Cell, float]], claim: str, h
     for place, (words, (cell, independent)) in enumerate(cells.items()):
         found = mean_squares(cell)
         here, single = ratio(found), cell.seeds < 6
-        told = "range of seeds" if single else "95 %"
+        reported = "range of seeds" if single else "95 %"
         sheet.add(f"{words}: ratio of means", "1", claim, here.of_means, NOT_PRINTED, independent=independent)
-        sheet.add(f"{words}: median of {cell.seeds} seeds ({told})", "1", None, here.text, NOT_PRINTED)
+        sheet.add(f"{words}: median of {cell.seeds} seeds ({reported})", "1", None, here.text, NOT_PRINTED)
         sheet.add(f"{words}: error of the extended filter", "1", None, float(found["EKF"].mean()), NOT_PRINTED)
         axis.plot([here.low, here.high], [place, place], color="#33475B")
         axis.plot(here.median, place, "o", color="#0072B2")

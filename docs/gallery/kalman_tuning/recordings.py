@@ -56,9 +56,9 @@ def errors(seed: int, candidates: np.ndarray, states: Sequence[str] = STATES) ->
         Mean squares [A2, A2, rad2/s2, rad2], shape (members, len(states)); the start is left out.
     """
     parameters = {"process_variance": candidates[:, :4], "measurement_variance": candidates[:, 4:]}
-    told = replay(seed).run(states, parameters, members=len(candidates))
+    reported = replay(seed).run(states, parameters, members=len(candidates))
     true = np.stack([recording(seed)[f"motor.{state}"] for state in states], axis=1)
-    return np.asarray(np.mean((told - true)[:, 1:] ** 2, axis=1))
+    return np.asarray(np.mean((reported - true)[:, 1:] ** 2, axis=1))
 
 
 def current_cost(seed: int, candidates: np.ndarray) -> np.ndarray:

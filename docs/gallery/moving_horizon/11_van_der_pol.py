@@ -93,9 +93,9 @@ def main() -> None:
     sheet.add("r3 by the printed formula, p3 = 0.1", "1", None, (top - at_tip)[17], PRINTED)
     tips = printed_tip(short)
     sheet.add("r2 by the printed formula, spread over p1", "%", None, spread(tips[:6]), PRINTED)
-    told = verdicts(recorded)
+    reported = verdicts(recorded)
     expected = np.array([[abs(a - b) > 1e-9 for a, b in zip(p, NOMINAL, strict=True)] for p in parameters])
-    right = int((told == expected).all(axis=1).sum())
+    right = int((reported == expected).all(axis=1).sum())
     why = "verdict of signature_track after 25 s with thresholds of ours, set on the sweeps of one parameter"
     sheet.add("verdicts that name the changed parameters", "1", None, f"{right} of {len(parameters)}", why)
     sheet.finish(draw(run, long, short))

@@ -31,7 +31,7 @@ def by_signature(read: np.ndarray) -> np.ndarray:
     return np.asarray(found[:, :, 0])
 
 
-def judged(case: Case, *, skids: bool = False) -> dict[tuple[str, float], Verdicts]:
+def evaluated(case: Case, *, skids: bool = False) -> dict[tuple[str, float], Verdicts]:
     """Verdicts of both at each noise, on the same trains and jams, or on skids of their size."""
     rng = np.random.default_rng(HELD_OUT_SEED)
     run = trains(case, MEMBERS, rng)
@@ -42,10 +42,10 @@ def judged(case: Case, *, skids: bool = False) -> dict[tuple[str, float], Verdic
         observe(case, run, read, with_balises=case.speed > 20.0, noise=noise)["odometer_fault"]
         for noise, read in parts.items()
     ]
-    told = {"signature": by_signature(np.concatenate([*parts.values()])), "rules": np.concatenate(by_rules)}
+    reported = {"signature": by_signature(np.concatenate([*parts.values()])), "rules": np.concatenate(by_rules)}
     return {
         (which, noise): verdicts(run, jams, part)
-        for which, both in told.items()
+        for which, both in reported.items()
         for noise, part in zip(NOISES, np.split(both, len(NOISES)), strict=True)
     }
 
@@ -61,7 +61,7 @@ def main() -> None:
     why = OURS.format(seed=HELD_OUT_SEED)
     shown: dict[str, list[tuple[float, float]]] = {"signature": [], "rules": []}
     for sign in ("", ", skids"):
-        by_case = [judged(case, skids=bool(sign)) for case in CASES.values()]
+        by_case = [evaluated(case, skids=bool(sign)) for case in CASES.values()]
         for noise, (which, bars) in product(NOISES, shown.items()):
             verdicts_of = [verdict[which, noise] for verdict in by_case]
             rates = add_rates(sheet, f"{which}{sign}, noise {noise:g} m/s", verdicts_of, why)

@@ -45,32 +45,32 @@ def main() -> None:
         ("norm", 0.1, True),
     ):
         runs[scaling, gain, noise] = driven(observers[scaling], noisy if noise else clean, gain=gain, **START)
-    for (scaling, gain, noise), told in runs.items():
+    for (scaling, gain, noise), reported in runs.items():
         label = f"{scaling}, q = {gain:g}" if gain else "model alone"
         label += ", noise" if noise else ""
         for i, name in enumerate(("x1", "x2")):
             pair = INDEPENDENT.get((scaling, gain, noise))
             why = NOISE if noise else PICKED
-            error = rms(told, true, name, late)
+            error = rms(reported, true, name, late)
             beside = None if pair is None else pair[i]
             sheet.add(f"RMSE of {name} from 2.5 s, {label}", "1", None, error, why, independent=beside)
             if gain == 0.1:
                 pair = INDEPENDENT.get((scaling, "look-up", noise))
-                error = rms(told, true, name, late, f"{name}_look_up")
+                error = rms(reported, true, name, late, f"{name}_look_up")
                 beside = None if pair is None else pair[i]
                 label_up = f"{scaling}, look-up alone" + (", noise" if noise else "")
                 sheet.add(f"RMSE of {name} from 2.5 s, {label_up}", "1", None, error, why, independent=beside)
     for (gain, noise), pair in {(0.1, False): (0.229, 0.599), (0.0, False): (0.540, 3.250)}.items():
-        told, label = runs["literal", gain, noise], f"q = {gain:g}" if gain else "model alone"
+        reported, label = runs["literal", gain, noise], f"q = {gain:g}" if gain else "model alone"
         for name, other in zip(("x1", "x2"), pair, strict=True):
             text = f"RMSE of {name} until 0.5 s, {label}"
-            sheet.add(text, "1", None, rms(told, true, name, early), PICKED, independent=other)
+            sheet.add(text, "1", None, rms(reported, true, name, early), PICKED, independent=other)
     stress, observer = {"rate_factor": 1.5, "braking": 2.25}, observers["literal"]
     far = recorded(BrakedOscillator(), 5.0, 5e-3, **stress)
-    told = driven(observer, far["measured_y"][:, None], **stress, **START, **observer.tabulated(stress))
+    reported = driven(observer, far["measured_y"][:, None], **stress, **START, **observer.tabulated(stress))
     for name, other in (("x1", "0.29 to 0.38"), ("x2", "0.41 to 1.14")):
         text = f"RMSE of {name} from 2.5 s, literal, q = 0.1, p = (1.5, 2.25)"
-        sheet.add(text, "1", None, rms(told, far, name, late), FOLDED, independent=other)
+        sheet.add(text, "1", None, rms(reported, far, name, late), FOLDED, independent=other)
     figure, axes = plt.subplots(2, 2, figsize=(10, 5.5), sharex=True, layout="constrained")
     for column, (scaling, noise) in enumerate((("literal", False), ("literal", True))):
         for axis, name in zip(axes[:, column], ("x1", "x2"), strict=True):

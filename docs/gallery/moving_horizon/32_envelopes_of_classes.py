@@ -75,16 +75,16 @@ def main() -> None:
     states = np.random.default_rng(0).uniform(-3.0, 3.0, (3, 40))
     for scaling, independent in (("literal", (0.046, 0.068, 0.224)), ("norm", (0.20, 0.34, 0.43))):
         one = observer if scaling == "literal" else CascadeSignature(7, "norm")
-        told = inverted(one, outputs(one, states, p), p)
+        reported = inverted(one, outputs(one, states, p), p)
         for i in range(3):
-            error = float(np.median(np.abs(told[i] - states[i])))
+            error = float(np.median(np.abs(reported[i] - states[i])))
             text = f"median error of x{i + 1}, 40 states of the set, {scaling}"
             sheet.add(text, "1", None, error, ERRORS, independent=independent[i])
         if scaling == "norm":
             continue
-        told = inverted(finer, outputs(finer, states, p), p)
+        reported = inverted(finer, outputs(finer, states, p), p)
         for i in range(3):
-            error = float(np.median(np.abs(told[i] - states[i])))
+            error = float(np.median(np.abs(reported[i] - states[i])))
             sheet.add(f"the same of x{i + 1}, literal, 13 nodes", "1", None, error, FINER)
 
     add_neighbours(sheet, observer, p)
@@ -95,7 +95,7 @@ def main() -> None:
         "13 nodes": driven(finer, true["measured_x1"][:, None], **start),
         "model alone": driven(observer, true["measured_x1"][:, None], gain=0.0, **start),
     }
-    for label, told in runs.items():
+    for label, reported in runs.items():
         for span, (low, high) in SHOWN.items():
             rows = (true["time"] >= low) & (true["time"] <= high)
             for name in ("x1", "x2", "x3"):
@@ -104,7 +104,7 @@ def main() -> None:
                     f"RMSE of {name}, {span}, q = 0.1, {label}".replace("q = 0.1, model", "model"),
                     "1",
                     None,
-                    rms(told, true, name, rows),
+                    rms(reported, true, name, rows),
                     why,
                 )
     figure, axes = plt.subplots(1, 4, figsize=(13, 3.3), layout="constrained")
@@ -113,8 +113,8 @@ def main() -> None:
     axes[0].title.set_fontsize(8)
     for axis, name in zip(axes[1:], ("x1", "x2", "x3"), strict=True):
         axis.plot(true["time"], true[name], "k", label="true")
-        for label, told in runs.items():
-            axis.plot(true["time"], told[name], lw=0.9, label=label)
+        for label, reported in runs.items():
+            axis.plot(true["time"], reported[name], lw=0.9, label=label)
         axis.axvline(0.46, color="0.6", lw=0.8)
         axis.set(xlabel="time [s]", ylabel=name)
     axes[1].legend(fontsize=7)
@@ -124,8 +124,8 @@ def main() -> None:
 def inverted(observer: CascadeSignature, windows: np.ndarray, p: object) -> np.ndarray:
     """States at the start of windows of shape (N_O, n), shape (3, n); traced once, where each one in NumPy is slow."""
     window = ca.SX.sym("window", len(windows))
-    told = observer.inverted([ca.ArrayInterface.SX(window, shape=(len(windows),))], None, p)
-    return np.array(ca.Function("inverted", [window], [ca.SX(told.state)])(windows))
+    reported = observer.inverted([ca.ArrayInterface.SX(window, shape=(len(windows),))], None, p)
+    return np.array(ca.Function("inverted", [window], [ca.SX(reported.state)])(windows))
 
 
 def add_neighbours(sheet: Sheet, observer: CascadeSignature, p: object) -> None:
@@ -138,7 +138,7 @@ def add_neighbours(sheet: Sheet, observer: CascadeSignature, p: object) -> None:
         grids[count] = grid, outputs(observer, np.hstack([grid, states]), p)
     for scaling, eps, count, independent in CASES:
         grid, windows = grids[count]
-        read = told_by(windows, eps, scaling)
+        read = reported_by(windows, eps, scaling)
         known, asked = np.split(read / read[:, : grid.shape[1]].std(axis=1, keepdims=True), [grid.shape[1]], axis=1)
         distance = np.sqrt(((known[:, :, None] - asked[:, None]) ** 2).sum(axis=0))
         for nearest in (1, 8):
@@ -152,7 +152,7 @@ def add_neighbours(sheet: Sheet, observer: CascadeSignature, p: object) -> None:
                 sheet.add(text, "1", None, value, NEIGHBOURS, independent=independent[i])
 
 
-def told_by(windows: np.ndarray, eps: float, scaling: NextScaling) -> np.ndarray:
+def reported_by(windows: np.ndarray, eps: float, scaling: NextScaling) -> np.ndarray:
     """Median point and chord of signatures, shape (4, n)."""
     found = dynamic_signature(windows, 67, eps, scaling)
     return np.concatenate([np.median(found, axis=1), found[:, -1] - found[:, 0]])

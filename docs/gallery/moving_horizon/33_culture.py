@@ -81,26 +81,26 @@ def main() -> None:
             found = []
             for seed in range(SEEDS if share else 1):
                 spread = np.random.default_rng(seed).uniform(-share, share, clean.shape)
-                told = driven(observer, clean * (1.0 + spread), **GUESS)
-                found.append([[rms(told, true, n, late, n + up) for n in NAMES] for up in ("", "_look_up")])
-            shown.setdefault(level, told)
+                reported = driven(observer, clean * (1.0 + spread), **GUESS)
+                found.append([[rms(reported, true, n, late, n + up) for n in NAMES] for up in ("", "_look_up")])
+            shown.setdefault(level, reported)
             for kind, pair in zip(("q", "look-up"), np.mean(found, axis=0), strict=True):
                 for i, name in enumerate(NAMES):
                     label = blend if kind == "q" else blend.replace("q = 0.3", "look-up alone")
                     other = INDEPENDENT.get((level, kind), (None, None))[i]
                     text = f"RMSE of {name} after 3 h, noise {level}, {label}".replace("noise clean", "no noise")
                     sheet.add(text, "kg/m3", None, pair[i], (NOISE if share else CLEAN)[way], independent=other)
-        told = driven(observer, measured, **GUESS | {"estimated_biomass": 0.06})
+        reported = driven(observer, measured, **GUESS | {"estimated_biomass": 0.06})
         for i, name in enumerate(NAMES):
             text = f"RMSE of {name} after 3 h, start (0.06, 2.2, 0.012), {blend}"
-            sheet.add(text, "kg/m3", None, rms(told, other_run, name, late), CLEAN[way], independent=OTHER["q"][i])
+            sheet.add(text, "kg/m3", None, rms(reported, other_run, name, late), CLEAN[way], independent=OTHER["q"][i])
     alone = driven(observer, clean, gain=0.0, **GUESS)
-    told = driven(observer, measured, gain=0.0, **GUESS | {"estimated_biomass": 0.06})
+    reported = driven(observer, measured, gain=0.0, **GUESS | {"estimated_biomass": 0.06})
     for i, name in enumerate(NAMES):
         error, there = rms(alone, true, name, late), INDEPENDENT["clean", "open"][i]
         sheet.add(f"RMSE of {name} after 3 h, model alone", "kg/m3", None, error, OPEN, independent=there)
         text = f"RMSE of {name} after 3 h, start (0.06, 2.2, 0.012), model alone"
-        sheet.add(text, "kg/m3", None, rms(told, other_run, name, late), OPEN, independent=OTHER["open"][i])
+        sheet.add(text, "kg/m3", None, rms(reported, other_run, name, late), OPEN, independent=OTHER["open"][i])
     candidates = (5.0, 10.0, 20.0, 40.0, 80.0)
     for mu, pair in zip(candidates, CultureSignature().look_up_errors(candidates), strict=True):
         text = f"error of single windows in half-widths of the tube, both quantities, mu = {mu:g}"

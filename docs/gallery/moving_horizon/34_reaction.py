@@ -63,15 +63,15 @@ def main() -> None:
         for noise in (0.0, 1e-3):
             y = true["measured_y"] + noise * np.random.default_rng(0).normal(size=len(true["time"]))
             values = seen.tabulated({"sample_period": period}) | {"sample_period": period}
-            told = driven(seen, y[:, None], estimated_x1=2.0, estimated_x2=1.0, **values)
+            reported = driven(seen, y[:, None], estimated_x1=2.0, estimated_x2=1.0, **values)
             late = (true["time"] >= 20 * period) & (true["time"] <= 100 * period)
             for name in ("x1", "x2"):
                 text = f"RMSE of {name}, q = 0.2, period {period} s, noise {noise:g}, samples 20 to 100"
-                sheet.add(text, "1", None, rms(told, true, name, late), ILL if noise else RUN)
-            rate = float(np.mean(told["rate"][late]))
+                sheet.add(text, "1", None, rms(reported, true, name, late), ILL if noise else RUN)
+            rate = float(np.mean(reported["rate"][late]))
             why = ILL if noise else RUN
             sheet.add(f"mean rate there, period {period} s, noise {noise:g}", "1/s", 0.15, rate, why)
-            axis.plot(true["time"], told["x1"], lw=0.9, label=f"noise {noise:g}")
+            axis.plot(true["time"], reported["x1"], lw=0.9, label=f"noise {noise:g}")
         axis.plot(true["time"], true["x1"], "k--", lw=0.9, label="true")
         axis.set(xlabel="time [s]", ylabel="x1", title=f"period {period} s")
         axis.legend(fontsize=7)

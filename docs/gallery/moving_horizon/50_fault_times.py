@@ -95,9 +95,9 @@ def main() -> None:
     lost = json.loads((Path(__file__).parent / "numbers" / "51_efficiency.json").read_text(encoding="utf-8"))["lines"][
         0
     ]
-    told = "y" if lost["quantity"] == "0.97 to 0.25" and lost["measured"] < np.inf else "x"
+    reported = "y" if lost["quantity"] == "0.97 to 0.25" and lost["measured"] < np.inf else "x"
     published = f"{TABLE[10]} (references 1 to 6: {REFERENCES[10]})"
-    sheet.add("fault 10: detected, limit kept", "", published, f"{told} {told}", EFFICIENCY)
+    sheet.add("fault 10: detected, limit kept", "", published, f"{reported} {reported}", EFFICIENCY)
     false = float(short.false.sum() + slow.false.sum())
     sheet.add("other alarms than the fault's own, all runs", "1", None, false, OTHERS)
 

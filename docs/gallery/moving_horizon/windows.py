@@ -24,9 +24,9 @@ def driven(observer: HybridSystem, measured: np.ndarray, **values: Any) -> Recor
     return _run(observer, measured, float(period), values)
 
 
-def rms(told: Record, true: Record, name: str, rows: np.ndarray, other: str = "") -> float:
+def rms(reported: Record, true: Record, name: str, rows: np.ndarray, other: str = "") -> float:
     """Root of the mean squared error of an estimate, or of another output against the same truth."""
-    return float(np.sqrt(np.mean((told[other or name][rows] - true[name][rows]) ** 2)))
+    return float(np.sqrt(np.mean((reported[other or name][rows] - true[name][rows]) ** 2)))
 
 
 def _run(system: HybridSystem, inputs: np.ndarray, period: float, values: dict[str, Any]) -> Record:
@@ -51,5 +51,5 @@ def _run(system: HybridSystem, inputs: np.ndarray, period: float, values: dict[s
         runtime.advance(k * period)
         rows.append(np.array(runtime.update_outputs()))
     table = np.array(rows)
-    told = {name: table[:, i] for i, name in enumerate(scalar_names(system.outputs))}
-    return told | {"time": period * np.arange(len(inputs))}
+    reported = {name: table[:, i] for i, name in enumerate(scalar_names(system.outputs))}
+    return reported | {"time": period * np.arange(len(inputs))}

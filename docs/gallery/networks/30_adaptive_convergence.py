@@ -22,27 +22,27 @@ def main() -> None:
         axes, (("predictor", AdaptivePredictor(), 0.1), ("hold", AdaptiveHold(), 0.09)), strict=True
     ):
         run = learn(observer, [period], 40.0)
-        bad = (run.error[0] >= 1.0, run.error[0] >= 0.1, np.abs(run.told[0, :, 0] - RHO[0]) > 0.5)
+        bad = (run.error[0] >= 1.0, run.error[0] >= 0.1, np.abs(run.reported[0, :, 0] - RHO[0]) > 0.5)
         words = ("state within 1", "state within 0.1", "rho1 within 5 %")
-        for word, told, other in zip(words, bad, independent[name], strict=False):
+        for word, reported, other in zip(words, bad, independent[name], strict=False):
             sheet.add(
                 f"{name} at {period:g} s: {word} after",
                 "s",
                 None,
-                settled(run.t, told),
+                settled(run.t, reported),
                 SHOWN,
                 repeats=0.02,
                 independent=other,
             )
         if name == "hold":
-            when = settled(run.t, np.abs(run.told[0, :, 1] - RHO[1]) > 1.0)
+            when = settled(run.t, np.abs(run.reported[0, :, 1] - RHO[1]) > 1.0)
             sheet.add("hold at 0.09 s: rho2 within 5 % after", "s", None, when, SHOWN, repeats=0.03, independent=37.5)
         else:
-            at = float(run.told[0, 3900, 1])
+            at = float(run.reported[0, 3900, 1])
             sheet.add("predictor at 0.1 s: rho2 at 39 s", "1", None, at, LATE, repeats=0.05, independent=9.2)
         axis.plot(run.t, np.maximum(run.error[0], 1e-6), label="state")
-        axis.plot(run.t, np.abs(run.told[0, :, 0] - RHO[0]), label="rho1")
-        axis.plot(run.t, np.abs(run.told[0, :, 1] - RHO[1]), label="rho2")
+        axis.plot(run.t, np.abs(run.reported[0, :, 0] - RHO[0]), label="rho1")
+        axis.plot(run.t, np.abs(run.reported[0, :, 1] - RHO[1]), label="rho2")
         axis.set(yscale="log", ylim=(1e-5, 1e3), xlabel="time [s]", ylabel="error", title=f"{name}, {period:g} s")
         axis.legend(fontsize=8)
     sheet.finish(figure)

@@ -30,7 +30,7 @@ def main() -> None:
         late = run.t >= 28.0
         with np.errstate(invalid="ignore"):
             largest = np.nan_to_num(run.error[:, late].max(axis=1), nan=np.inf)
-            found = (largest < 0.1) & (np.abs(run.told[:, late, 0] - RHO[0]).max(axis=1) < 0.5)
+            found = (largest < 0.1) & (np.abs(run.reported[:, late, 0] - RHO[0]).max(axis=1) < 0.5)
         first = float(PERIODS[~found][0])
         why = OURS if independent is None else CRITERION
         sheet.add(f"first failure, {name}", "s", None, first, why, repeats=0.035, independent=independent)

@@ -95,14 +95,14 @@ def arm_errors(
         stamps.append(numbers * cell.interval + cell.delay)
         nodes.append(0.0 * numbers if at_once else numbers % 2 + 1.0)
         noises.append(np.sqrt(variance) * np.random.default_rng(cell.seed).normal(size=(2, len(numbers))))
-    told = motion(np.concatenate(sent))[:2] + np.concatenate(noises, axis=1)  # all at once: each call costs
+    reported = motion(np.concatenate(sent))[:2] + np.concatenate(noises, axis=1)  # all at once: each call costs
     batch.notify(
         "packet",
         np.concatenate(members),
         np.concatenate(stamps),
         node=np.concatenate(nodes),
-        motor_angle=told[0],
-        link_angle=told[1],
+        motor_angle=reported[0],
+        link_angle=reported[1],
     )
     t = STEP * np.arange(round(stop / STEP) + 1)
     batch.start(0.0)

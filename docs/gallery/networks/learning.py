@@ -21,13 +21,13 @@ class Learning(NamedTuple):
     """What was told over time.
 
     Args:
-        t: instants [s], shape (k,). error: norm of the state's error, shape (members, k). told: outputs, in the order
-            that was asked for, shape (members, k, outputs).
+        t: instants [s], shape (k,). error: norm of the state's error, shape (members, k). reported: outputs, in the
+            order that was asked for, shape (members, k, outputs).
     """
 
     t: np.ndarray
     error: np.ndarray
-    told: np.ndarray
+    reported: np.ndarray
 
 
 @cache
@@ -69,8 +69,8 @@ def learn(
     batch.start()
     stamps = [period * np.arange(int(end / period) + 1) for period in periods]
     members = np.repeat(np.arange(len(periods)), [len(own) for own in stamps])
-    told = np.concatenate(stamps)
-    batch.notify("sample", members, told, x1=sol(told)[0])
+    reported = np.concatenate(stamps)
+    batch.notify("sample", members, reported, x1=sol(reported)[0])
     t = GRID * np.arange(round(end / GRID) + 1)
     rows = batch.run(t[1:], ["x1", "x2", *outputs])
     error = np.hypot(*(rows[:, :, j] - sol(t)[j] for j in (0, 1)))

@@ -91,8 +91,8 @@ def choose(root: Path, count: int, seed: int) -> list[Change]:
         by_room.setdefault(change.room, []).append(change)
     total = sum(map(len, by_room.values()))
     random = Random(seed)
-    spare = count - EACH * len(by_room)
-    wanted = {room: EACH + round(spare * len(places) / total) for room, places in sorted(by_room.items())}
+    fallback = count - EACH * len(by_room)
+    wanted = {room: EACH + round(fallback * len(places) / total) for room, places in sorted(by_room.items())}
     chosen = [one for room, n in wanted.items() for one in random.sample(by_room[room], min(n, len(by_room[room])))]
     return random.sample(chosen, len(chosen))
 

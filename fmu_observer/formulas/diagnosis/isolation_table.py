@@ -66,7 +66,7 @@ class IsolationTable:
         """Names of the faults, in order."""
         return tuple(self.must)
 
-    def judge(
+    def evaluate(
         self,
         alarms: Sequence[Array],
         available: Sequence[Array],

@@ -140,7 +140,7 @@ def windowed_square(memory: Array, residual: Array) -> _Windowed:
     return _Windowed(value, vector(*kept[1:], square) if kept else memory)
 
 
-def judge(before: Alarm, t: Array, exceeds: Array, raise_after: Array = 1.0, clear_after: Array = 1.0) -> Alarm:
+def evaluate(before: Alarm, t: Array, exceeds: Array, raise_after: Array = 1.0, clear_after: Array = 1.0) -> Alarm:
     """One sample of an alarm: raised after so many samples in a row above the threshold, cleared after so many below.
 
     Args:

@@ -130,7 +130,9 @@ def _independent_count(values: np.ndarray) -> float:
     return float(count / max(length, 1.0))
 
 
-def judge(squares: np.ndarray, degrees: float | np.ndarray, *, white: bool, level: float = _TEST_LEVEL) -> Consistency:
+def evaluate(
+    squares: np.ndarray, degrees: float | np.ndarray, *, white: bool, level: float = _TEST_LEVEL
+) -> Consistency:
     """Whether normalised squares are those of a consistent filter.
 
     Args:

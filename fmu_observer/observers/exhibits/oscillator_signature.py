@@ -102,9 +102,9 @@ class OscillatorSignature(SignatureObserver):
         places = [int(i) * count + int(j) for i in some for j in some]
         offs: list[Array] = []
         for k, made in enumerate(self._points_of(np.reshape(grid, (2, len(places))), p)):
-            given = p.table[k * count**2 : (k + 1) * count**2]
-            size = TABLE_ERROR * np.maximum(np.max(given) - np.min(given), 1e-300)
-            offs += [np.abs(given[i] - made[n]) / size for n, i in enumerate(places)]
+            stated = p.table[k * count**2 : (k + 1) * count**2]
+            size = TABLE_ERROR * np.maximum(np.max(stated) - np.min(stated), 1e-300)
+            offs += [np.abs(stated[i] - made[n]) / size for n, i in enumerate(places)]
         return {"table": np.max(np.stack(offs))}
 
     def _points_of(self, states: np.ndarray, p: Any) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.formulas.diagnosis.redundancy import larger
-from fmu_observer.formulas.diagnosis.window_inversion import Alarm, judge
+from fmu_observer.formulas.diagnosis.window_inversion import Alarm, evaluate
 from fmu_observer.observers.exhibits.drive_train_residuals import (
     DRIVE_MEMORY,
     DRIVE_PARAMETERS,
@@ -248,11 +248,11 @@ class WindTurbineDiagnosis(HybridSystem):
         new |= sample_torques(m, generator, driving, u.torque)
         new |= {"shaft_partial": m.shaft_partial + p.sample_period * (rotor - generator / p.gear_ratio)}
         settled = _settled(m, p)
-        exceeds, undecided = _judged(m, t, p)
+        exceeds, undecided = _evaluated(m, t, p)
         alarms = _alarms(m, [settled * value for value in exceeds], t, p)
         new |= {name: vector(*values) for name, values in zip(Alarm._fields, zip(*alarms, strict=True), strict=True)}
         pairs = settled * undecided
-        found = judge(Alarm(*m.undecided_alarm), t, pairs, p.sensor_raise_after, p.sensor_clear_after)
+        found = evaluate(Alarm(*m.undecided_alarm), t, pairs, p.sensor_raise_after, p.sensor_clear_after)
         return new | {"undecided_pairs": pairs, "undecided_alarm": vector(*found)}
 
     def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -270,7 +270,7 @@ class WindTurbineDiagnosis(HybridSystem):
         return found | residuals | whole | _ratios(x, p) | warned(x, p)
 
 
-def _judged(m: Any, t: Array, p: Any) -> tuple[list[Array], Array]:
+def _evaluated(m: Any, t: Array, p: Any) -> tuple[list[Array], Array]:
     """Which residuals speak for each alarm, in the order of `_GROUPS`, and how many pairs stay undecided."""
     sizes = [
         np.maximum(m.held_pitch_single[i] / p.pitch_single_limit, m.held_pitch_triple[i] / p.pitch_triple_limit)
@@ -334,7 +334,7 @@ def _believed(m: Any, sensor: int, t: Array, p: Any) -> Array:
 def _alarms(m: Any, exceeds: Sequence[Array], t: Array, p: Any) -> list[Alarm]:
     kinds = [group.kind for group in _GROUPS for _ in range(group.size)]
     return [
-        judge(
+        evaluate(
             Alarm(m.raised[i], m.contrary[i], m.since[i]),
             t,
             exceeds[i],

@@ -158,7 +158,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
         covariance = x.error_covariance
         jump = np.vstack([_UNMOVED, np.hstack([1.0 - gain, 0.0, 0.0])])
         moved = jump @ covariance @ jump.T + gain**2 * variance * _OF_PREDICTED
-        known = variance * SAME_PLACE + covariance[1, 1] * _OF_SCALE
+        known = variance * EQUAL_PLACE + covariance[1, 1] * _OF_SCALE
         return {
             "estimated_position": np.where(begins, reported, position),
             "predicted_position": np.where(begins, reported, predicted),
@@ -202,7 +202,7 @@ class AdaptiveWheelRadius(GatedObserver, GapCertified):
 
 
 DISTURBED = np.outer([1.0, 0.0, 1.0], [1.0, 0.0, 1.0])  # the odometer's noise moves position and predicted position
-SAME_PLACE = DISTURBED
+EQUAL_PLACE = DISTURBED
 _OF_SCALE = np.diag([0.0, 1.0, 0.0])
 _OF_PREDICTED = np.diag([0.0, 0.0, 1.0])
 _UNMOVED = np.eye(2, 3)  # position and scale at a balise

@@ -63,7 +63,7 @@ _RESTARTS = warning_output(
 _REFUSALS = (
     memory("balises_believed", "1", 0.0, "Balises believed since the position began"),
     memory("balises_refused", "1", 0.0, "Balises refused in a row that agree"),
-    memory("told_place", "m", 0.0, "Place of the last balise, as told"),
+    memory("reported_place", "m", 0.0, "Place of the last balise, as told"),
     memory("restart_count", "1", 0.0, "Times that the position began anew"),
 )
 
@@ -140,9 +140,9 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         require_chosen(self.name, self.option_choices, loss=loss)
         self.window, self.passes, self.loss = window, passes, loss
         self.gate_start = OFF
-        told_of = {s.name: s for s in window_outputs(window)}
-        judged = (s for s in self.outputs if loss == "squares" or s.name != "nis")
-        self.outputs = tuple(told_of.get(s.name, s) for s in judged)
+        reported_of = {s.name: s for s in window_outputs(window)}
+        evaluated = (s for s in self.outputs if loss == "squares" or s.name != "nis")
+        self.outputs = tuple(reported_of.get(s.name, s) for s in evaluated)
         super().__init__()
         self.options = {"window": window, "passes": passes, "loss": loss}
 
@@ -213,11 +213,11 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         now = {
             "balises_believed": np.where(anew > 0.0, 1.0, x.balises_believed + 1.0 - refused),
             "balises_refused": count * (1.0 - anew),
-            "told_place": u.balise_position,
+            "reported_place": u.balise_position,
             "restart_count": x.restart_count + anew,
         }
         any_before = x.balises_believed + x.balises_refused > 0.0
-        near = np.abs(u.balise_position - x.told_place) <= p.balise_deviation
+        near = np.abs(u.balise_position - x.reported_place) <= p.balise_deviation
         again = np.where(near, any_before, False)  # reported twice, it is one
         return {name: np.where(again, old[name], now[name]) for name in now}
 

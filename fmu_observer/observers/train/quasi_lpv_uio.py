@@ -265,12 +265,12 @@ class QuasiLpvUio(GatedObserver, GapCertified):
         speed = x.estimated_speed
         acceleration = self._free_acceleration(x, u, p) - self.friction(0.0, x, u, p)[0]
         now = u.odometer + p.reading_age * np.where(speed > 0.0, acceleration, 0.0)
-        judged = self.rules.at_sample(x, Reading(u.odometer, speed, p.residual_gain * (now - speed), u.effort), p)
-        after, begins = np.where(judged.restart > 0.0, now, speed), judged.onset > 0.0
+        evaluated = self.rules.at_sample(x, Reading(u.odometer, speed, p.residual_gain * (now - speed), u.effort), p)
+        after, begins = np.where(evaluated.restart > 0.0, now, speed), evaluated.onset > 0.0
         disturbance = np.where(begins, x.last_disturbance, x.unknown_deceleration)
         rate = np.where(begins, x.last_disturbance_rate, x.unknown_deceleration_rate)
         # What may have been the estimate's mistake costs no more than the odometer would have.
-        position = np.where(judged.withdrawn > 0.0, x.odometer_way + x.onset_lead, x.estimated_position)
+        position = np.where(evaluated.withdrawn > 0.0, x.odometer_way + x.onset_lead, x.estimated_position)
         return {
             "estimated_position": position,
             "estimated_speed": after,
@@ -281,7 +281,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             "last_disturbance": disturbance,
             "last_disturbance_rate": rate,
             "onset_lead": np.where(begins, x.estimated_position - x.odometer_way, x.onset_lead),
-            **judged.memory,
+            **evaluated.memory,
         }
 
     def _at_balise(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -296,11 +296,11 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             # Exactly on the balise: the gate has restarted the position there, and the way before it says nothing.
             np.where(x.balises_used > 0.0, np.where(position == place, 0.0, 1.0), 0.0),
         )
-        judged = self.rules.at_balise(x, passing, p)
-        restarts = judged.restart > 0.0
+        evaluated = self.rules.at_balise(x, passing, p)
+        restarts = evaluated.restart > 0.0
         return {
             "estimated_position": place,
-            "estimated_speed": np.where(restarts, x.held_odometer, x.estimated_speed) + judged.shift,
+            "estimated_speed": np.where(restarts, x.held_odometer, x.estimated_speed) + evaluated.shift,
             "odometer_way": 0.0,
             "held_innovation": np.where(restarts, 0.0, x.held_innovation),
             "last_innovation": position - place,
@@ -309,7 +309,7 @@ class QuasiLpvUio(GatedObserver, GapCertified):
             "balise_reading": x.held_odometer,
             "balises_used": x.balises_used + 1.0,
             "onset_lead": place,
-            **judged.memory,
+            **evaluated.memory,
         }
 
     def _difference(self, x: Any) -> Array:

@@ -19,7 +19,7 @@ from fmu_observer.detection.threshold_detector import (
     NEVER,
     THRESHOLD_MEMORY,
     THRESHOLD_PARAMETERS,
-    judge,
+    evaluate,
     threshold_requirements,
 )
 from fmu_observer.observers.evaluated_observer import GapCertified
@@ -148,7 +148,7 @@ class StoppingUio(GatedObserver, GapCertified):
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         innovation = x.held_innovation
-        effort = u.effort * (1.0 - x.judged_fault * p.switches_effort)
+        effort = u.effort * (1.0 - x.detected_fault * p.switches_effort)
         acceleration = (p.brake_coefficient * effort - p.davis_b * x.estimated_speed) / p.mass + x.disturbance_estimate
         return {
             "estimated_position": x.estimated_speed,
@@ -166,14 +166,14 @@ class StoppingUio(GatedObserver, GapCertified):
                 "balises_used": x.balises_used + 1.0,
             }
         innovation = u.odometer - x.estimated_speed
-        judged = judge(x, innovation, p.sample_period, p)
+        evaluated = evaluate(x, innovation, p.sample_period, p)
         moves = np.maximum(u.odometer, x.estimated_speed) >= p.min_speed
         jump = np.abs(u.odometer - x.last_reading)
         # One sample without a change is enough: a jump after it looks like a fault as soon as it is as large as one.
         stood = np.where(x.unchanged_time > 0.5 * p.sample_period, np.where(jump > p.threshold_start, 1.0, 0.0), 0.0)
         return {
             "held_innovation": innovation,
-            **{name: np.where(moves, new, getattr(x, name)) for name, new in judged.items()},
+            **{name: np.where(moves, new, getattr(x, name)) for name, new in evaluated.items()},
             "last_reading": u.odometer,
             "unchanged_time": np.where(jump > 0.0, 0.0, x.unchanged_time + p.sample_period),
             "held_seen": np.maximum(x.held_seen, stood),
@@ -188,8 +188,8 @@ class StoppingUio(GatedObserver, GapCertified):
             "balises": x.balises_used,
             "residual": x.held_innovation,
             "residual_level": x.filtered_residual,
-            "odometer_fault": x.judged_fault,
-            "recovering": x.judged_fault * x.armed,
+            "odometer_fault": x.detected_fault,
+            "recovering": x.detected_fault * x.armed,
             "held_odometer": x.held_seen,
         }
 

@@ -24,7 +24,7 @@ class WheelStage:
     1. `states` are some of the observer's, which it is handed as ``x``.
     2. `flow` returns the derivative of each by name, `sampled` what an odometer sample changes.
     3. `events` are the odometer samples it needs, if any.
-    4. `judged` adds its own check to the certificate of the second stage.
+    4. `also_of` adds its own check to the certificate of the second stage.
     """
 
     states: tuple[Signal, ...] = ()

@@ -66,8 +66,8 @@ def _path(model: FmuModel, context: Context) -> np.ndarray:
 
 def _compared(first: np.ndarray, second: np.ndarray, when: str, good: str) -> CheckOutcome:
     """Whether two paths have the identical derivatives, each of shape (steps, n)."""
-    same = np.array_equal(first, second, equal_nan=True)
-    return by("" if same else f"{when} the same states have other derivatives", good)
+    equal = np.array_equal(first, second, equal_nan=True)
+    return by("" if equal else f"{when} the same states have other derivatives", good)
 
 
 def _numbered(count: int) -> list[str]:

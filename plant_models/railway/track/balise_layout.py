@@ -90,14 +90,14 @@ class Positions:
     Args:
         size: number of entries.
         positions: start values [m], no more than `size`.
-        told_apart: number of crossings in a section up to which entries at one place are recognised; beyond it each one
-            counts.
+        distinguished: number of crossings in a section up to which entries at one place are recognised; beyond it each
+            one counts.
 
     Raises:
         ValueError: there are too many positions, one is not finite, or they do not increase.
     """
 
-    def __init__(self, size: int, positions: Sequence[float], told_apart: int = 8) -> None:
+    def __init__(self, size: int, positions: Sequence[float], distinguished: int = 8) -> None:
         require_whole("balise_reader", balise_capacity=size)
         places = _places(positions)
         if len(places) > size:
@@ -113,7 +113,7 @@ class Positions:
                 f"balise_reader: balises must be listed in increasing position, one at a place: number {i + 1} at "
                 f"{places[i]:g} m follows number {i} at {places[i - 1]:g} m."
             )
-        self.size, self.told_apart = size, told_apart
+        self.size, self.distinguished = size, distinguished
         start = (*places, *[UNUSED] * (size - len(places)))
         text = "Positions of the balises; 1e30 where an entry is not used"
         self.parameters: tuple[Signal, ...] = (parameter("positions", "m", start, text, size=size),)
@@ -125,10 +125,10 @@ class Positions:
             place = direction * p.positions[i]
             passed = passed + np.where(place > direction * before, np.where(place <= direction * after, 1.0, 0.0), 0.0)
         distinct, at = 0.0 * before, before
-        for _ in range(self.told_apart + 1):
+        for _ in range(self.distinguished + 1):
             at = self.next(at, direction, p)
             distinct = distinct + np.where(direction * at <= direction * after, 1.0, 0.0)
-        return np.where(distinct <= self.told_apart, distinct, passed)
+        return np.where(distinct <= self.distinguished, distinct, passed)
 
     def next(self, position: Array, direction: Array, p: Any) -> Array:
         """See `BaliseLayout`."""

@@ -62,7 +62,7 @@ def on_time() -> np.ndarray:
     return final(driven(observer(), INSTANTS))
 
 
-def assert_same(seen: np.ndarray, reference: np.ndarray) -> None:
+def assert_equal(seen: np.ndarray, reference: np.ndarray) -> None:
     """Replayed telegrams act at their stamps; the grid is the same, so only roundings of a divided cell differ."""
     np.testing.assert_allclose(seen, reference, rtol=1e-9, atol=1e-9)
 
@@ -91,7 +91,7 @@ def test_replay_makes_order_and_latency_irrelevant(
     channel = Channel(latency=latency, latency_jitter=jitter, seed=seed)
     ran = driven(receiver, [t for t in INSTANTS if t < 1.3], channel, h, 3.0)
     reference = final(driven(observer(), [t for t in INSTANTS if t < 1.3], h=h))
-    assert_same(final(ran), reference)
+    assert_equal(final(ran), reference)
     assert np.max(np.abs(reference - on_time)) > 1e-6  # the later balises do matter
 
 
@@ -138,7 +138,7 @@ def test_an_fmi2_receiver_of_unknown_make_is_not_sent_back_and_forth() -> None:
     receiver.slave.getFMUstate = lambda: saved.append("saved")
     ran = driven(receiver, INSTANTS)
     assert saved == []
-    assert_same(final(ran), final(driven(observer(), INSTANTS)))
+    assert_equal(final(ran), final(driven(observer(), INSTANTS)))
 
 
 def test_two_telegrams_for_an_fmi2_receiver_in_one_step_are_both_used() -> None:
@@ -148,7 +148,7 @@ def test_two_telegrams_for_an_fmi2_receiver_in_one_step_are_both_used() -> None:
         ran = driven(receiver, close)
         assert receiver.outcomes()["lost"] == 0  # type: ignore[index]
         assert receiver.outcomes()["accepted"] == len(close)  # type: ignore[index]
-        assert_same(final(ran), final(driven(observer(), close)))
+        assert_equal(final(ran), final(driven(observer(), close)))
 
 
 def test_telegrams_that_arrive_at_one_instant_are_all_used_by_fmi2() -> None:
@@ -180,7 +180,7 @@ def test_what_became_of_a_telegram_is_known_by_the_end(
     balises = Balises(layout, receivers=["observer"], channel=Channel(latency=late), timing=timing)
     ran = run([block(Motion(), "plant"), receiver], [], H, round(end / H), balises)
     assert len(ran.events) == len(layout.instants)
-    assert "told" not in {e.outcomes["observer"] for e in ran.events}
+    assert "notified" not in {e.outcomes["observer"] for e in ran.events}
 
 
 class Logging(EventMode):

@@ -33,7 +33,7 @@ def ran(fmu: Path, method: str, step: float = 0.1, **more: Any) -> Outcome:
     return outcome
 
 
-def off_and_told(outcome: Outcome) -> tuple[np.ndarray, np.ndarray]:
+def off_and_stated(outcome: Outcome) -> tuple[np.ndarray, np.ndarray]:
     """True errors of the stamps and their told bounds [s]."""
     events = outcome.result.events
     true = np.sort(np.concatenate([crossings(place, STOP) for place in PLACES]))
@@ -50,10 +50,10 @@ def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6])
 def test_a_plant_with_a_solver_is_off_by_less_than_stated(fmu: Path, tolerance: float, method: str) -> None:
     outcome = ran(fmu, method, tolerance=tolerance)
-    off, told = off_and_told(outcome)
-    assert np.all(off <= told)
+    off, reported = off_and_stated(outcome)
+    assert np.all(off <= reported)
     # and it is no bound that says nothing
-    assert np.median(told) <= 200.0 * tolerance + 1e-2 * (method == "interpolate")
+    assert np.median(reported) <= 200.0 * tolerance + 1e-2 * (method == "interpolate")
     probe = outcome.result.summary["probe"]
     assert probe["restores"] == "within_tolerance" or tolerance == 1e-3  # with which it takes whole steps
     if method == "auto" and tolerance < 1e-3:

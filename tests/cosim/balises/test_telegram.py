@@ -78,11 +78,11 @@ def test_chance_has_the_stated_distribution() -> None:
     them.
     """
     channel = Channel(latency=0.1, latency_jitter=0.5, missed_fraction=0.4, position_noise=0.5, seed=1)
-    told = [channel.transmit(crossing(0.0), n, 0.0) for n in range(4000)]
-    missed = np.array([e.kind == "missed" for e in told])
+    reported = [channel.transmit(crossing(0.0), n, 0.0) for n in range(4000)]
+    missed = np.array([e.kind == "missed" for e in reported])
     assert missed.mean() == pytest.approx(0.4, abs=0.031)
-    assert np.mean([e.delivered_at for e in told if e.kind == "true"]) == pytest.approx(0.35, abs=0.012)
-    assert np.std([e.position for e in told]) == pytest.approx(0.5 * 2.0, rel=0.05)
+    assert np.mean([e.delivered_at for e in reported if e.kind == "true"]) == pytest.approx(0.35, abs=0.012)
+    assert np.std([e.position for e in reported]) == pytest.approx(0.5 * 2.0, rel=0.05)
     assert all(Channel(missed_fraction=1.0).transmit(crossing(0.0), n, 0.0).kind == "missed" for n in range(200))
     assert all(Channel(missed_fraction=0.0).transmit(crossing(0.0), n, 0.0).kind == "true" for n in range(200))
 

@@ -141,8 +141,8 @@ def test_a_telegram_that_is_delivered_twice_counts_once(tmp_path: Path, name: st
     """LAW: no receiver changes by a bit; another telegram of this stamp, and this balise later, are told."""
     ends = []
     for again in ("", "B1,0.5,0.5,5,20\nB1,0.5,0.75,5,20\nB2,1.0,1.3,7,0\n"):
-        told = "identity,stamp,delivered_at,position,location_accuracy\nB1,0.5,0.5,5,20\nB2,1.0,1.1,11,0\n" + again
-        scenario = without_position(tmp_path, told)
+        reported = "identity,stamp,delivered_at,position,location_accuracy\nB1,0.5,0.5,5,20\nB2,1.0,1.1,11,0\n" + again
+        scenario = without_position(tmp_path, reported)
         signals = {s.name for s in train_observers()[name]().input_signals}
         scenario.add("receiver", observer=name, **{"as": way})
         wired = [f"log.{s} -> receiver.{s}" for s in ("odometer", "effort") if s in signals]
@@ -154,6 +154,6 @@ def test_a_telegram_that_is_delivered_twice_counts_once(tmp_path: Path, name: st
 
 
 def test_false_telegrams_of_one_instant_are_two(tmp_path: Path) -> None:
-    told = "stamp,position,identity,kind\n0.5,5,false,false\n0.5,25,false,false\n"
-    outcome = without_position(tmp_path, told).run(warn=quietly)
+    reported = "stamp,position,identity,kind\n0.5,5,false,false\n0.5,25,false,false\n"
+    outcome = without_position(tmp_path, reported).run(warn=quietly)
     assert [e.outcomes["observer"] for e in outcome.result.events] == ["accepted", "accepted"]

@@ -142,10 +142,10 @@ def test_survives_newer_versions_and_says_so(run: Result, tmp_path: Path) -> Non
     (tmp_path / "run.json").write_text(json.dumps(data), encoding="utf-8")
     comparison = check(run, read_baseline(tmp_path / "run.json"))
     assert comparison.equal
-    told = " ".join(comparison.notes)
-    assert "newer version" in told
-    assert "fmu-observer" in told
-    assert "win32" in told
+    reported = " ".join(comparison.notes)
+    assert "newer version" in reported
+    assert "fmu-observer" in reported
+    assert "win32" in reported
 
 
 LOCALE = """
@@ -272,9 +272,9 @@ def test_another_model_is_refused_and_another_delivery_is_not(tmp_path: Path) ->
 
 def test_a_renamed_signal_is_missing_and_the_nearest_is_named(tmp_path: Path) -> None:
     write_baseline(hand_made(), tmp_path / "run.json")
-    told = hand_made()
-    renamed = np.array(told.table).view(table_dtype(["time", "train.speeed", "train.brake"]))
-    result = Result(renamed, [replace(told.signals[0], name="train.speeed"), told.signals[1]])
+    reported = hand_made()
+    renamed = np.array(reported.table).view(table_dtype(["time", "train.speeed", "train.brake"]))
+    result = Result(renamed, [replace(reported.signals[0], name="train.speeed"), reported.signals[1]])
     comparison = check(result, read_baseline(tmp_path / "run.json"))
     assert [(s.name, s.status, s.nearest[0]) for s in comparison.failed] == [("train.speed", "missing", "train.speeed")]
 

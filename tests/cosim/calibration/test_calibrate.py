@@ -155,7 +155,7 @@ def test_command(path: Path, table: Path, tmp_path: Path, capsys: pytest.Capture
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "reported"),
     [
         (["--parameters", "adhesion_at_rest"], "changes nothing in speed"),
         (["--parameters", "mas"], "did you mean 'mass'"),
@@ -170,7 +170,7 @@ def test_command(path: Path, table: Path, tmp_path: Path, capsys: pytest.Capture
     ],
 )
 def test_mistakes_are_reported(
-    path: Path, table: Path, more: list[str], told: str, capsys: pytest.CaptureFixture[str]
+    path: Path, table: Path, more: list[str], reported: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(words(path, table, *more)) == 2
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err

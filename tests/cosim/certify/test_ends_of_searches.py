@@ -86,16 +86,16 @@ def test_what_grows_at_every_gap_has_the_limit_zero() -> None:
 
 def test_runs_go_on_beyond_the_range() -> None:
     """The limit of `Relaxation` is at 0.5 s, wherever its range lies."""
-    told: dict[str, Any] = {"varied": "delay", "delay_parameter": "period", "period": 0.2}
-    assert simulated_limit(search(**told, low=0.6)) == pytest.approx(0.5, abs=0.05)
-    assert simulated_limit(search(**told, high=0.4)) == inf
-    assert reach(search(**told, high=0.4))[1] == 0.4  # delays: the memory ends there
-    never = search(**told, low=3.0, high=9.0, stop=20.0, settings={"gain": 400.0})
+    reported: dict[str, Any] = {"varied": "delay", "delay_parameter": "period", "period": 0.2}
+    assert simulated_limit(search(**reported, low=0.6)) == pytest.approx(0.5, abs=0.05)
+    assert simulated_limit(search(**reported, high=0.4)) == inf
+    assert reach(search(**reported, high=0.4))[1] == 0.4  # delays: the memory ends there
+    never = search(**reported, low=3.0, high=9.0, stop=20.0, settings={"gain": 400.0})
     assert simulated_limit(never, 4) == 0.0
     lost = simulated(to_simulate(never, "delay"), 4)
     assert (lost.value, lost.kind) == (0.0, "simulated")
     assert lost.statement == "lost at 0.0938 s already, the shortest that was tried"
-    kept = simulated(to_simulate(search(**told, high=0.4), "delay"))
+    kept = simulated(to_simulate(search(**reported, high=0.4), "delay"))
     assert (kept.value, kept.kind) == (0.4, "not found up to")
 
 

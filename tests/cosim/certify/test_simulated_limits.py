@@ -50,22 +50,22 @@ def search(**changes: object) -> LimitSearch:
 
 def test_a_limit_is_found_by_runs() -> None:
     """With the period given by the delay of the search: the limit is where ``gain period`` is 2, 0.5 s."""
-    told = search(varied="delay", delay_parameter="period", low=0.05, high=0.9, period=0.2)
-    assert simulated_limit(told) == pytest.approx(0.5, abs=0.85 / 15**2 + 0.01)  # a slow end within 30 s
-    assert keeps_plant(told, [0.1, 0.45, 0.55]).tolist() == [True, True, False]
+    reported = search(varied="delay", delay_parameter="period", low=0.05, high=0.9, period=0.2)
+    assert simulated_limit(reported) == pytest.approx(0.5, abs=0.85 / 15**2 + 0.01)  # a slow end within 30 s
+    assert keeps_plant(reported, [0.1, 0.45, 0.55]).tolist() == [True, True, False]
 
 
 def test_the_step_in_which_the_first_failure_lies_is_tried_anew() -> None:
     """Of four values 0.333 s is kept and 0.617 s lost; of four between them 0.428 s is, and 0.522 s not."""
-    told = search(varied="delay", delay_parameter="period", low=0.05, high=0.9, period=0.2)
-    assert simulated_limit(told, 4) == pytest.approx(0.05 + 5.0 * 0.85 / 9.0, rel=1e-12)
+    reported = search(varied="delay", delay_parameter="period", low=0.05, high=0.9, period=0.2)
+    assert simulated_limit(reported, 4) == pytest.approx(0.05 + 5.0 * 0.85 / 9.0, rel=1e-12)
 
 
 def test_ends_of_the_range() -> None:
-    told = search(varied="delay", delay_parameter="period", period=0.2)
+    reported = search(varied="delay", delay_parameter="period", period=0.2)
     assert simulated_limit(search(varied="delay", delay_parameter="period", period=0.2, high=0.4)) == np.inf
     assert simulated_limit(search(varied="delay", delay_parameter="period", period=0.2, low=0.6)) < 0.6
-    assert not keeps_plant(told, 40.0)[0]  # what grows beyond all numbers is lost, and no error
+    assert not keeps_plant(reported, 40.0)[0]  # what grows beyond all numbers is lost, and no error
 
 
 def test_every_sampled_observer_has_limits() -> None:
@@ -79,10 +79,10 @@ def test_every_sampled_observer_has_limits() -> None:
     assert found["as printed"] < 0.1 * found["simulated"]
 
 
-class Told(Relaxation):
+class Notified(Relaxation):
     """`x` and `y` from two nodes, each with an event of its own: what came last, and how often."""
 
-    name = "told"
+    name = "reported"
     states = (memory("x", "1", 9.0, "First"), memory("y", "1", 9.0, "Second"))
     outputs = (output_signal("first", "1", "First"), output_signal("second", "1", "Second"))
     parameters = (parameter("period", "s", 0.1, "Period"),)
@@ -99,13 +99,13 @@ class Told(Relaxation):
 
 
 def test_nodes_may_have_events_of_their_own() -> None:
-    told = search(
-        system=Told(),
+    reported = search(
+        system=Notified(),
         node_events=("one", "other"),
         payload=lambda t: {"x": 1.0 + 0.0 * t, "y": 2.0 + 0.0 * t},
         truth=lambda t: {"first": 1.0 + 0.0 * np.asarray(t), "second": 2.0 + 0.0 * np.asarray(t)},
     )
-    assert keeps_plant(told, [0.1, 0.2]).tolist() == [True, True]
+    assert keeps_plant(reported, [0.1, 0.2]).tolist() == [True, True]
 
 
 def test_the_train_behind_a_network_keeps_its_plant_far_beyond_the_printed_bounds() -> None:

@@ -176,8 +176,8 @@ def test_false_alarms_are_indications_that_begin_outside_the_zones() -> None:
 
 def test_telegrams_that_were_not_used_do_not_count() -> None:
     result = result_of(time=[0.0, 1.0, 2.0, 3.0], p__speed=[0.0] * 4, o__speed=[1.0, 2.0, 3.0, 4.0])
-    told = {"accepted": 1.0, "rejected": 2.0, "replayed": 3.0}
-    events = [BaliseRecord(t, t, f"B{t:g}", 0.0, 0.0, outcomes={"o": outcome}) for outcome, t in told.items()]
+    reported = {"accepted": 1.0, "rejected": 2.0, "replayed": 3.0}
+    events = [BaliseRecord(t, t, f"B{t:g}", 0.0, 0.0, outcomes={"o": outcome}) for outcome, t in reported.items()]
     spec = ReportSpec(true_speed="p.speed", observers=["o"])
     found = error_at_balises(Result(result.table, result.signals, events), spec, "o", "speed")
     assert found is not None

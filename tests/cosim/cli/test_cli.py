@@ -205,13 +205,13 @@ def test_a_reader_that_leaves_is_no_reason_for_a_traceback() -> None:
     )
     assert process.stdout is not None
     process.stdout.close()
-    _, told = process.communicate(timeout=120)
-    assert (process.returncode, told) == (141, "")
+    _, reported = process.communicate(timeout=120)
+    assert (process.returncode, reported) == (141, "")
 
 
 def test_a_usage_error_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
-    for given, message in (("0", "at least 1"), ("many", "expected a whole number (got 'many')")):
+    for stated, message in (("0", "at least 1"), ("many", "expected a whole number (got 'many')")):
         with pytest.raises(SystemExit) as error:
-            main(["run", "--seeds", given])
+            main(["run", "--seeds", stated])
         assert error.value.code == 2
         assert message in capsys.readouterr().err

@@ -37,7 +37,7 @@ def write(speed: str) -> None:
     Path("run.toml").write_text(SCENARIO.replace("MASS", speed), encoding="utf-8")
 
 
-def told(capsys: pytest.CaptureFixture[str]) -> Any:
+def reported(capsys: pytest.CaptureFixture[str]) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
@@ -52,14 +52,14 @@ def test_a_baseline_from_making_to_accepting(capsys: pytest.CaptureFixture[str])
     assert "mass = 81000.0" in shown
     write("10.1")
     assert main(["baseline", "check", "kept/run.json", "--json"]) == 1
-    data = told(capsys)
+    data = reported(capsys)
     assert data["equal"] is False
     assert {s["name"] for s in data["signals"] if s["status"] == "differs"} >= {"loco.speed", "loco.position"}
     # whatever differs
     assert main(["baseline", "check", "kept/run.json", "--rtol", "1", "--atol", "1e6", "--json"]) == 0
     capsys.readouterr()
     assert main(["baseline", "update", "kept/run.json", "--json"]) == 0
-    assert told(capsys)["change"] == "changed"
+    assert reported(capsys)["change"] == "changed"
     assert main(["baseline", "check", "kept/run.json", "--quiet"]) == 0
 
 

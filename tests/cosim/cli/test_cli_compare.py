@@ -107,11 +107,11 @@ def test_time_tolerance(run: Call) -> None:
 def test_tolerances_from_a_file_and_over_it(run: Call) -> None:
     text = 'ignore = ["train.pos*"]\n[default]\nrelative = 0.5\n[signals."train.*"]\nabsolute = 0.05\nrelative = 0.0\n'
     Path("tolerances.toml").write_text(text)
-    given = ["--tolerances", "tolerances.toml"]
-    code, out, _ = run("a", "b", *given)
+    stated = ["--tolerances", "tolerances.toml"]
+    code, out, _ = run("a", "b", *stated)
     assert code == 1
     assert "1 ignored" in out
-    assert run("a", "b", *given, "--set-tolerance", "train.speed={absolute = 0.11}")[0] == 0
+    assert run("a", "b", *stated, "--set-tolerance", "train.speed={absolute = 0.11}")[0] == 0
 
 
 MISTAKES = [

@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from odd_results import assert_same, odd_result
+from odd_results import assert_equal, odd_result
 
 from cosim import load_result
 from cosim.cli import main
@@ -27,7 +27,7 @@ def test_chain_through_all_formats_keeps_everything(tmp_path: Path, capsys: pyte
     for source, target in pairwise(chain):
         assert main(["export", str(tmp_path / source), str(tmp_path / target)]) == 0
         assert str(tmp_path / target) in capsys.readouterr().out
-    assert_same(some_result(), load_result(tmp_path / "g.pq"))
+    assert_equal(some_result(), load_result(tmp_path / "g.pq"))
 
 
 def test_chosen_signals_without_units(tmp_path: Path) -> None:
@@ -59,9 +59,9 @@ def test_mistakes_are_reported_in_a_line(
     some_result().save(tmp_path / "a.h5")
     before = (tmp_path / "a.h5").read_bytes()
     assert main(["export", str(tmp_path / source), str(tmp_path / target), *more]) == 2
-    told = capsys.readouterr().err
-    assert told.startswith("cosim: ")
-    assert message in told
-    assert len(told.splitlines()) == 1
+    reported = capsys.readouterr().err
+    assert reported.startswith("cosim: ")
+    assert message in reported
+    assert len(reported.splitlines()) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
     assert (tmp_path / "a.h5").read_bytes() == before

@@ -48,8 +48,8 @@ def test_the_command_writes_what_a_scenario_plays_back(
     time, position, _, odometer, stamps = journey()
     rows = "".join(f"{t:.1f},{3.6 * v:.6f}\n" for t, v in zip(time, odometer, strict=True))
     Path("log.csv").write_text("time,odometer [km/h]\n" + rows)
-    told = "".join(f"{t:.9f},{p:.9f}\n" for t, p in zip(stamps, np.interp(stamps, time, position), strict=True))
-    Path("telegrams.csv").write_text("stamp,position\n" + told)
+    reported = "".join(f"{t:.9f},{p:.9f}\n" for t, p in zip(stamps, np.interp(stamps, time, position), strict=True))
+    Path("telegrams.csv").write_text("stamp,position\n" + reported)
     words = ["log.csv", "reference.csv", "--trajectory", "--odometer", "odometer", "--odometer-std", "0.05"]
     words += ["--telegrams", "telegrams.csv"]
     assert main(["export", *words]) == 0

@@ -62,6 +62,6 @@ def test_mistakes_of_the_user_are_explained_without_a_traceback(
     }
     for word, arguments in cases.items():
         assert main(["show", *arguments]) == 2
-        told = capsys.readouterr().err
-        assert word in told
-        assert "Traceback" not in told
+        reported = capsys.readouterr().err
+        assert word in reported
+        assert "Traceback" not in reported

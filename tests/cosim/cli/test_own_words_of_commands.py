@@ -61,7 +61,7 @@ def files(tmp_path: Path) -> dict[str, Path]:
     return files
 
 
-def told(line: str, files: dict[str, Path], capsys: pytest.CaptureFixture[str], *more: str) -> str:
+def reported(line: str, files: dict[str, Path], capsys: pytest.CaptureFixture[str], *more: str) -> str:
     capsys.readouterr()
     words = [str(files[w]) if w in files else w.format(file=FILE) for w in line.split()]
     words = [str(files["OUT"]) + w.removeprefix("OUT") if w.startswith("OUT") else w for w in words]
@@ -79,7 +79,7 @@ def test_every_command_is_examined() -> None:
 @pytest.mark.parametrize("json", [False, True])
 @pytest.mark.parametrize("what", STEPPING)
 def test_what_a_step_raises(what: str, json: bool, files: dict[str, Path], capsys: pytest.CaptureFixture[str]) -> None:
-    text = told(STEPPING[what], files, capsys, *(["--json"] if json else []))
+    text = reported(STEPPING[what], files, capsys, *(["--json"] if json else []))
     assert WORDS in text
     assert "t = 0.3 s" in text if what == "benchmark-observers" else ALONE in text
     assert ("PlainSpeed" if what == "benchmark-observers" else "boiler") in text
@@ -90,7 +90,7 @@ def test_what_a_step_raises(what: str, json: bool, files: dict[str, Path], capsy
 def test_what_is_raised_where_a_model_is_asked(
     what: str, files: dict[str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = told(ASKING[what], files, capsys)
+    text = reported(ASKING[what], files, capsys)
     assert WORDS in text
     assert "boiler" in text or FILE in text
     assert ("t = 0 s" in text) == (what == "linearise")
@@ -112,7 +112,7 @@ def hosted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ],
 )
 def test_what_an_fmu_says(words: str, hosted: Path, files: dict[str, Path], capsys: pytest.CaptureFixture[str]) -> None:
-    text = told(words, files | {"HOSTED": hosted}, capsys)
+    text = reported(words, files | {"HOSTED": hosted}, capsys)
     assert WORDS in text
     assert "failing" in text
     assert "t = 0.2" in text

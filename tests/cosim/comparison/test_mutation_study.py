@@ -39,9 +39,9 @@ def study() -> Iterator[SimpleNamespace]:
 
 
 @pytest.fixture(scope="module")
-def judge(study: Any) -> Iterator[Any]:
-    with study.verdicts.judge() as judged:
-        yield judged
+def evaluate(study: Any) -> Iterator[Any]:
+    with study.verdicts.evaluate() as evaluated:
+        yield evaluated
 
 
 def cells(change: str) -> list[str]:
@@ -63,14 +63,14 @@ def chosen(study: Any) -> list[Any]:
     return [*runs[::EVERY], *deliveries, *mutants.row_mutations()]
 
 
-def test_changes_are_caught_and_missed_as_the_page_says(study: Any, judge: Any) -> None:
-    rows = [judge.mutation(mutation, "block") for mutation in chosen(study)]
+def test_changes_are_caught_and_missed_as_the_page_says(study: Any, evaluate: Any) -> None:
+    rows = [evaluate.mutation(mutation, "block") for mutation in chosen(study)]
     assert [row.change for row in rows if not as_on_the_page(study, row)] == [], "run: python docs/studies/mutations.py"
     assert [row.change for row in rows if row.harmless and row.caught_by_default] == []
     assert [row.change for row in rows if not row.harmless and not row.caught_by_default and not row.why] == []
 
 
-def test_the_unchanged_run_gives_no_alarm(study: Any, judge: Any) -> None:
+def test_the_unchanged_run_gives_no_alarm(study: Any, evaluate: Any) -> None:
     conditions, repetition = study.manoeuvre.Conditions, study.repetitions.Repetition
     ways = [
         repetition("Python", 1, conditions(stepper="python", order=study.manoeuvre.ORDER[::-1]).run),
@@ -78,12 +78,12 @@ def test_the_unchanged_run_gives_no_alarm(study: Any, judge: Any) -> None:
         repetition("new process", 1, study.repetitions.in_new_process),
         *study.repetitions.other_steps(),
     ]
-    rows = [row for way in ways for row in judge.repetition(way)]
+    rows = [row for way in ways for row in evaluate.repetition(way)]
     assert [(row.change, row.found, row.size) for row in rows if any(row.caught)] == []
 
 
-def test_rows_that_do_not_nest_are_the_known_exception(judge: Any) -> None:
-    row = judge.not_nested()
+def test_rows_that_do_not_nest_are_the_known_exception(evaluate: Any) -> None:
+    row = evaluate.not_nested()
     assert row.caught_by_default
     assert row.found in PAGE.read_text(encoding="utf-8")
 

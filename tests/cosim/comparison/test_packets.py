@@ -11,7 +11,7 @@ from made_results import compared, made
 from cosim.comparison.compare import _keeps_packets
 from cosim.comparison.comparison_text import comparison_text
 from cosim.comparison.verdict import Comparison
-from cosim.provenance.rerun import _same_result
+from cosim.provenance.rerun import _equal_result
 from cosim.report.live.render import live_page
 from cosim.report.page.comparison import comparison_page
 from cosim.results.result import PacketRecord, Result
@@ -65,8 +65,8 @@ def test_equal_packets_agree_in_any_order_and_within_the_tolerance() -> None:
     comparison = compared(result(PACKETS), result([near, *PACKETS[3:], *PACKETS[:2]]))
     assert comparison.equal
     assert "; 5 packets match." in comparison_text(comparison)
-    assert not _same_result(result(PACKETS), result([*PACKETS[:2], near, *PACKETS[3:]]))
-    assert _same_result(result([LOST]), result([replace(LOST)]))
+    assert not _equal_result(result(PACKETS), result([*PACKETS[:2], near, *PACKETS[3:]]))
+    assert _equal_result(result([LOST]), result([replace(LOST)]))
 
 
 def test_what_keeps_no_packets_is_not_compared() -> None:

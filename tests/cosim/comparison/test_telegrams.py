@@ -42,8 +42,8 @@ def changed(which: int, **changes: object) -> list[BaliseRecord]:
 
 @given(st.permutations(RECORDS))
 def test_order_in_the_list_is_irrelevant(shuffled: list[BaliseRecord]) -> None:
-    told = verdict(RECORDS, shuffled)
-    assert (told.matched, told.differences, told.max_shift) == (9, [], 0.0)
+    reported = verdict(RECORDS, shuffled)
+    assert (reported.matched, reported.differences, reported.max_shift) == (9, [], 0.0)
 
 
 @given(st.sets(st.integers(0, 8), max_size=8))
@@ -58,12 +58,12 @@ def test_missing_and_extra_ones_are_those_left_out(gone: set[int]) -> None:
 
 
 def test_a_late_stamp_is_a_difference_in_time() -> None:
-    told = verdict(RECORDS, changed(4, stamp=5.01, delivered_at=5.11))
-    (found,) = told.differences
+    reported = verdict(RECORDS, changed(4, stamp=5.01, delivered_at=5.11))
+    (found,) = reported.differences
     assert found.kind == "time"
     assert "passed 0.01 s late" in found.text
     assert "delivered 0.01 s late" in found.text
-    assert told.max_shift == pytest.approx(0.01)
+    assert reported.max_shift == pytest.approx(0.01)
     assert not verdict(RECORDS, changed(4, stamp=5.0 + 5e-7)).differences
 
 
@@ -78,11 +78,11 @@ def test_a_late_stamp_is_a_difference_in_time() -> None:
     ],
 )
 def test_content_is_compared(change: dict[str, object], text: str) -> None:
-    told = verdict(RECORDS, changed(4, **change))
-    (found,) = told.differences
+    reported = verdict(RECORDS, changed(4, **change))
+    (found,) = reported.differences
     assert found.kind == "payload"
     assert text in found.text
-    assert told.matched == 9
+    assert reported.matched == 9
 
 
 def test_content_within_tolerance_and_receivers_of_one_side_pass() -> None:

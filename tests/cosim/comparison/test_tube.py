@@ -38,7 +38,7 @@ def test_band_is_that_of_the_naive_computation(
     inside = np.array([t for t in at if t <= time[-1]] or [0.0])
     band = band_of(Curve(time, values), inside, tolerance)
     expected = np.array([naive_band(time, values, t, tolerance) for t in inside])
-    assert band.judged.all()
+    assert band.evaluated.all()
     assert np.allclose(band.low, expected[:, 0], rtol=0.0, atol=ROUNDING)
     assert np.allclose(band.high, expected[:, 1], rtol=0.0, atol=ROUNDING)
 
@@ -59,7 +59,7 @@ def test_pieces_are_bands_of_their_own(line: tuple[np.ndarray, np.ndarray], tole
 
 def test_beyond_the_ends_nothing_is_evaluated() -> None:
     band = band_of(Curve(np.array([0.0, 1.0]), np.array([0.0, 1.0])), np.array([-0.2, -0.05, 1.05, 1.2]), 0.1)
-    assert band.judged.tolist() == [False, True, True, False]
+    assert band.evaluated.tolist() == [False, True, True, False]
     assert np.allclose(band.high, [0.0, 0.05, 1.0, 1.0], atol=ROUNDING)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from compiled_runs import assert_same, both, chain, random_linear, steps_compiled
+from compiled_runs import assert_equal, both, chain, random_linear, steps_compiled
 from test_fmus.build import linear_fmu
 from test_fmus.events import awkward_fmu, periodic_fmu, timed_fmu, triggered_fmu
 
@@ -55,7 +55,7 @@ def test_awkward_fmus(tmp_path: Path, behaviour: Any, version: Any, algorithm: s
     scenario = around(tmp_path, awkward_fmu(tmp_path, behaviour, version=version))
     overrides = {"master.algorithm": algorithm, "master.events": "local"}
     python, compiled = both(scenario, **overrides)
-    assert_same(python, compiled)
+    assert_equal(python, compiled)
     if behaviour != "short":  # that is trouble in every step
         assert steps_compiled(compiled) >= 2  # up to the trouble, which begins in the third step
     assert len(compiled.result.table) > 2
@@ -69,7 +69,7 @@ def test_early_returns_and_time_events_are_finished_in_python(tmp_path: Path) ->
     scenario.connect("j.level -> z.u1").master(events="local")
     python, compiled = both(scenario)
     assert python.failure is None
-    assert_same(python, compiled)
+    assert_equal(python, compiled)
 
 
 def test_events_propagated_stay_with_python(tmp_path: Path) -> None:
@@ -94,25 +94,25 @@ def test_values_that_are_not_finite(tmp_path: Path, version: Any) -> None:
     assert python.failure is not None
     assert "grows" not in python.failure  # by the names of the components
     assert "c0.y1 is inf" in python.failure
-    assert_same(python, compiled)
+    assert_equal(python, compiled)
     assert len(compiled.result.table) == 9  # e^709 is the largest double: the eighth step
 
 
 def test_an_interrupt_keeps_the_rows(tmp_path: Path) -> None:
     scenario = chain(tmp_path, [random_linear(tmp_path, "a", np.random.default_rng(1), 2)], stop=1000.0, step=0.01)
-    told: list[float] = []
+    reported: list[float] = []
 
     def interrupt(t: float, _stop: float) -> None:
-        told.append(t)
+        reported.append(t)
         if t > 50.0:
             raise KeyboardInterrupt
 
     outcome = scenario.run(progress=interrupt, overrides={"master.stepper": "compiled"}, warn=lambda _: None)
     assert outcome.failure is not None
     assert "interrupted" in outcome.failure
-    assert outcome.result.table["time"][-1] == told[-1] > 50.0
+    assert outcome.result.table["time"][-1] == reported[-1] > 50.0
     assert len(outcome.result.table) < 100_001
-    assert len(told) > 3  # again and again on the way, not once at the end
+    assert len(reported) > 3  # again and again on the way, not once at the end
 
 
 def test_without_a_compiler_python_does_it_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,12 +159,12 @@ def test_the_library_is_compiled_once(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_progress_is_reported_up_to_the_end(tmp_path: Path) -> None:
     scenario = chain(tmp_path, [random_linear(tmp_path, "a", np.random.default_rng(1), 3)], stop=100.0, step=0.01)
-    told: list[float] = []
-    outcome = scenario.run(progress=lambda t, _: told.append(t), warn=lambda _: None)
+    reported: list[float] = []
+    outcome = scenario.run(progress=lambda t, _: reported.append(t), warn=lambda _: None)
     assert steps_compiled(outcome) == 10_000
-    assert told == sorted(told)
-    assert told[-1] == 100.0
-    assert max(np.diff(told)) <= 4096 * 0.01 + 1e-9
+    assert reported == sorted(reported)
+    assert reported[-1] == 100.0
+    assert max(np.diff(reported)) <= 4096 * 0.01 + 1e-9
 
 
 def test_the_loop_of_the_master_may_stop_inside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,8 +194,8 @@ def test_a_chunk_ends_when_its_time_is_up(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(compiled_stepper, "SECONDS", 0.0)
     monkeypatch.setattr(compiled_stepper.CompiledStepper, "__init__", hurried)
-    told: list[float] = []
-    outcome = scenario.run(progress=lambda t, _: told.append(t), warn=lambda _: None)
+    reported: list[float] = []
+    outcome = scenario.run(progress=lambda t, _: reported.append(t), warn=lambda _: None)
     assert steps_compiled(outcome) == 500
-    assert told[0] == pytest.approx(0.17, rel=1e-12)
-    assert max(np.diff(told[:-1])) == pytest.approx(0.01, rel=1e-9)
+    assert reported[0] == pytest.approx(0.17, rel=1e-12)
+    assert max(np.diff(reported[:-1])) == pytest.approx(0.01, rel=1e-9)

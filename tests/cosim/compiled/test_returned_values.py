@@ -45,11 +45,11 @@ def test_a_receiver_that_counts_missing_samples_gives_equal_numbers_in_both_step
 ) -> None:
     """Its count was read in the middle of a telegram, with the answer that its outputs were to get."""
     astray: list[Exception] = []
-    answer = RecordedReturn.__call__
+    response = RecordedReturn.__call__
 
     def watched(self: RecordedReturn, *arguments: Any) -> int:
         try:
-            return answer(self, *arguments)
+            return response(self, *arguments)
         except RuntimeError as error:
             astray.append(error)
             raise

@@ -192,8 +192,8 @@ def test_without_the_flag_nobody_speaks_of_tools() -> None:
 def test_the_user_is_warned_before_the_run(tmp_path: Path) -> None:
     path = linear_fmu(tmp_path, "remote", **LAG, needs_tool=True)
     outcome = cosim.Scenario(stop=0.1, step=0.1).add("remote", fmu=str(path)).run()
-    told = [w for w in outcome.result.summary["warnings"] if "needsExecutionTool" in w]
-    assert told == [
+    reported = [w for w in outcome.result.summary["warnings"] if "needsExecutionTool" in w]
+    assert reported == [
         "remote: the FMU needs another program to be installed (needsExecutionTool); its description does not say "
         "which."
     ]

@@ -90,7 +90,7 @@ def test_aliases_are_one_value_and_negated_ones_have_the_other_sign(tmp_path: Pa
     write()
     assert read(made, ["w", "u_negated", "u_float64"]) == [-2.0, 2.0, 0.5]  # before the slave is initialised as well
     made.exit_initialization()
-    assert read(made, ["y_negated", "y_same", "y_float64", "w", "u_negated"]) == [-1.5, 1.5, 1.5, -2.0, 2.0]
+    assert read(made, ["y_negated", "y_equal", "y_float64", "w", "u_negated"]) == [-1.5, 1.5, 1.5, -2.0, 2.0]
     assert [made.exact_reader(name)() for name in ("y_negated", "w", "u_negated")] == [(-1.5,), (-2.0,), (2.0,)]
     made.exact_writer("u_negated")([-7.0])
     assert read(made, ["w", "u_negated"]) == [7.0, -7.0]

@@ -132,11 +132,11 @@ def test_numbers_of_all_types_are_read_and_written_as_doubles(typed3: Component)
     """Mixed in one call, in an order that has nothing to do with the types."""
     begin(typed3)
     kinds = ["int8", "float64", "boolean", "uint16", "float32", "enumeration", "uint64", "int32", "float64"]
-    given_values = [-5.0, 0.1, 1.0, 65535.0, 0.5, 2.0, 2.0**40, -(2.0**31), 0.1]
+    stated_values = [-5.0, 0.1, 1.0, 65535.0, 0.5, 2.0, 2.0**40, -(2.0**31), 0.1]
     write, buffer = typed3.writer([f"u_{kind}" for kind in kinds])
-    buffer[:] = given_values
+    buffer[:] = stated_values
     write()
-    assert read(typed3, [f"u_{kind}" for kind in kinds]) == given_values
+    assert read(typed3, [f"u_{kind}" for kind in kinds]) == stated_values
     back = read(typed3, [f"y_{kind}" for kind in kinds])
     assert back == [-6.0, 1.1, 0.0, 65534.0, 1.5, 3.0, 2.0**40 + 1.0, -(2.0**31) + 1.0, 1.1]
 

@@ -305,8 +305,8 @@ def test_what_was_said_of_columns_outlives_files_and_is_shown(tmp_path: Path) ->
     PLANTS["lag_of_tests"] = Lag
     try:
         scenario.connect("log.u -> lag.a", "log.v -> lag.b")
-        told = [when(link) for link in scenario.structure().links]
-        assert sorted(told) == ["a line, its course within the step", "held, of the start of the step"]
+        reported = [when(link) for link in scenario.structure().links]
+        assert sorted(reported) == ["a line, its course within the step", "held, of the start of the step"]
         first = quietly(scenario)
         again = quietly(Scenario.load(scenario.save(tmp_path / "saved.toml")))
         first.write(tmp_path / "run", report=False)

@@ -83,10 +83,10 @@ def test_telegrams_between_communication_points_are_delivered_at_their_instants(
 
 
 def test_what_comes_out_does_not_depend_on_the_step_nor_on_earlier_runs() -> None:
-    given = DeadReckoning(offset=0.25)
-    s = scenario(given)
+    stated = DeadReckoning(offset=0.25)
+    s = scenario(stated)
     first, again, fine = s.run(warn=lambda _: None), s.run(warn=lambda _: None), s.set("step", 0.01).run()
-    assert given.where == 0.0, "each run has a copy"
+    assert stated.where == 0.0, "each run has a copy"
     assert np.array_equal(first.result.table, again.result.table)
     assert first["observer.position"][-1] == pytest.approx(fine["observer.position"][-1], abs=1e-9)
 

@@ -62,11 +62,11 @@ def test_values_are_those_of_a_naive_look_up(rows: list[tuple[int, int]], share:
     time, values = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
     recording = play(time, line=values, step_held=values)
     for t in sorted({*time.tolist(), float(time[0] + share * (time[-1] - time[0]))}):
-        same = [v for at, v in rows if abs(at - t) <= 1e-9]
+        equal = [v for at, v in rows if abs(at - t) <= 1e-9]
         before, after = recording.at(t, before=True), recording.at(t)
-        if same:
-            assert before.tolist() == [same[0]] * 2
-            assert after.tolist() == [same[-1]] * 2
+        if equal:
+            assert before.tolist() == [equal[0]] * 2
+            assert after.tolist() == [equal[-1]] * 2
         else:
             earlier = [v for at, v in rows if at < t][-1]
             last, first = np.flatnonzero(time < t)[-1], np.flatnonzero(time > t)[0]
@@ -78,10 +78,10 @@ def test_values_are_those_of_a_naive_look_up(rows: list[tuple[int, int]], share:
 
 def test_the_next_event_is_the_next_jump_and_then_none() -> None:
     result = result_of([0.0, 0.2, 0.2, 0.5, 0.5, 1.0], v=[1, 1, 2, 2, 2, 2])
-    told = replace(
+    reported = replace(
         result, events=[BaliseRecord(stamp=0.4, delivered_at=0.5, identity="B1", position=1.0, true_position=1.0)]
     )
-    recording = make_recording(told, "run.csv", None, "rec", "linear", None)
+    recording = make_recording(reported, "run.csv", None, "rec", "linear", None)
     assert recording.events.tolist() == [0.2]  # at 0.5 a telegram was told to somebody, and nothing jumped here
     assert recording.next_event(0.0) == 0.2
     assert recording.next_event(0.2) == NEVER

@@ -227,9 +227,9 @@ def test_before_anything_was_read_inputs_keep_their_start_values() -> None:
 
     class Strict(Parrot):
         def setString(self, references: Iterable[int], values: Iterable[Any]) -> None:
-            given = list(values)
-            assert all(isinstance(value, str) for value in given)
-            super()._set(references, given)
+            stated = list(values)
+            assert all(isinstance(value, str) for value in stated)
+            super()._set(references, stated)
 
     parts = [component(Strict(), name) for name in "ab"]
     prepare(parts, [("a.said", "b.heard"), ("b.said", "a.heard")], 1.0, 1).run()

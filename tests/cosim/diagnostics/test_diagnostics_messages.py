@@ -159,8 +159,8 @@ def test_the_first_and_last_are_kept_and_all_are_counted(first: int, last: int, 
     for i in range(count):
         log.add(float(i), f"message {i}", i % 2, b"c")
     kept = [m.text for m in log.kept() if m.status != OMITTED]
-    told = [f"message {i}" for i in range(count)]
-    assert kept == (told if count <= first + last else told[:first] + told[-last:])
+    reported = [f"message {i}" for i in range(count)]
+    assert kept == (reported if count <= first + last else reported[:first] + reported[-last:])
     omitted = [m.text for m in log.kept() if m.status == OMITTED]
     assert omitted == (
         [f"{count - first - last} messages here were counted and not kept"] if count > first + last else []

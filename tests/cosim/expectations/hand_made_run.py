@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cosim.evaluation.spec import ReportSpec
-from cosim.expectations import Judged, judge
+from cosim.expectations import Evaluated, evaluate
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.run.outcome import Outcome
 from cosim.scenario.schema import parse_scenario
@@ -45,17 +45,17 @@ def telegrams() -> list[BaliseRecord]:
     at 9 s.
     """
 
-    def told(stamp: float, name: str, first: str, second: str, **more: Any) -> BaliseRecord:
+    def reported(stamp: float, name: str, first: str, second: str, **more: Any) -> BaliseRecord:
         return BaliseRecord(
             stamp, stamp, name, 10.0 * stamp, 10.0 * stamp, outcomes={"observer": first, "other": second}, **more
         )
 
     return [
         BaliseRecord(1.0, math.nan, "A", 10.0, 10.0, kind="missed"),
-        told(2.0, "B", "rejected", "accepted", kind="false"),
-        told(3.0, "C", "late", "accepted"),
-        told(6.0, "D", "accepted", "replayed"),
-        told(9.0, "E", "undelivered", "undelivered"),
+        reported(2.0, "B", "rejected", "accepted", kind="false"),
+        reported(3.0, "C", "late", "accepted"),
+        reported(6.0, "D", "accepted", "replayed"),
+        reported(9.0, "E", "undelivered", "undelivered"),
     ]
 
 
@@ -94,9 +94,9 @@ SPEC = ReportSpec(
 )
 
 
-def judged(result: Result, *items: Mapping[str, Any], spec: ReportSpec = SPEC) -> list[Judged]:
+def evaluated(result: Result, *items: Mapping[str, Any], spec: ReportSpec = SPEC) -> list[Evaluated]:
     """What becomes of expectations of a run that was to go from 0 to 10 s."""
     table = parse_scenario(
         {"stop": 10.0, "step": 1.0, "components": {"train": {"model": "locomotive"}}, "expect": list(items)}, "test"
     )
-    return judge(table, Outcome(result, spec))
+    return evaluate(table, Outcome(result, spec))

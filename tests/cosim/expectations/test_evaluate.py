@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hand_made_run import AFTER, SPEC, TIME, columns, hand_made, judged
+from hand_made_run import AFTER, SPEC, TIME, columns, evaluated, hand_made
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import UnmetError
 from cosim.evaluation.spec import ReportSpec
-from cosim.expectations import Judged
+from cosim.expectations import Evaluated
 from cosim.expectations.indicator_levels import first_on
 from cosim.results.result import Result, SignalInfo
 from cosim.results.results_folder import read_results, write_results
@@ -58,7 +58,7 @@ BOUNDS = [
 def test_an_error_and_its_bound(
     bound: float, window: dict[str, float], kept: bool, share: float, when: float, text: str
 ) -> None:
-    (found,) = judged(hand_made(changes={"observer.bound": np.full(12, bound)}), BOUND | window)
+    (found,) = evaluated(hand_made(changes={"observer.bound": np.full(12, bound)}), BOUND | window)
     assert found.passed is kept
     assert found.measured == pytest.approx(share, rel=1e-12)  # rounding of a quotient
     assert found.when == when
@@ -67,10 +67,10 @@ def test_an_error_and_its_bound(
 
 def test_a_bound_that_was_kept_until_the_run_failed_is_not_met() -> None:
     bound = {"observer.bound": np.full(12, 1.0)}
-    (found,) = judged(hand_made(7.0, "derailed", bound), BOUND)
+    (found,) = evaluated(hand_made(7.0, "derailed", bound), BOUND)
     assert not found.passed
     assert "not reached" in found.text
-    (found,) = judged(hand_made(7.0, "derailed", {"observer.bound": np.full(12, 0.2)}), BOUND)
+    (found,) = evaluated(hand_made(7.0, "derailed", {"observer.bound": np.full(12, 0.2)}), BOUND)
     assert "broken at 6 of 9 rows" in found.text
 
 
@@ -78,7 +78,7 @@ def test_a_bound_that_was_kept_until_the_run_failed_is_not_met() -> None:
 def test_sizes_of_errors(
     item: dict[str, Any], what: str, measured: float, when: float, limits: tuple[float, float]
 ) -> None:
-    met, unmet = (judged(hand_made(), item | {what: limit})[0] for limit in limits)
+    met, unmet = (evaluated(hand_made(), item | {what: limit})[0] for limit in limits)
     assert (met.passed, unmet.passed) == (True, False)
     assert met.measured == pytest.approx(measured, rel=1e-12)  # rounding of sums of ten numbers
     assert unmet.limit == limits[1]
@@ -100,7 +100,7 @@ SIGNALS = [
 def test_bounds_of_signals(
     item: dict[str, Any], met: dict[str, Any], unmet: dict[str, Any], measured: float, when: float
 ) -> None:
-    good, bad = (judged(hand_made(), {"check": "signal"} | item | bounds)[0] for bounds in (met, unmet))
+    good, bad = (evaluated(hand_made(), {"check": "signal"} | item | bounds)[0] for bounds in (met, unmet))
     assert (good.passed, bad.passed) == (True, False)
     assert bad.measured == pytest.approx(measured)
     assert bad.when == when
@@ -127,7 +127,7 @@ INDICATORS = [
 
 @pytest.mark.parametrize(("item", "passed", "measured"), INDICATORS)
 def test_indicators(item: dict[str, Any], passed: bool, measured: float) -> None:
-    (found,) = judged(hand_made(), item)
+    (found,) = evaluated(hand_made(), item)
     assert found.passed is passed
     assert found.measured == pytest.approx(measured, nan_ok=True)
 
@@ -151,7 +151,7 @@ TELEGRAMS = [
 
 @pytest.mark.parametrize(("item", "passed", "counts"), TELEGRAMS)
 def test_telegrams(item: dict[str, Any], passed: list[bool], counts: list[int]) -> None:
-    found = judged(hand_made(), {"check": "telegrams"} | item)
+    found = evaluated(hand_made(), {"check": "telegrams"} | item)
     assert [j.passed for j in found] == passed
     assert [j.measured for j in found] == counts
 
@@ -162,7 +162,7 @@ def test_what_a_gate_ignored_was_not_taken() -> None:
     true = [e for e in run.events if e.kind == "true"]
     ignored = replace(run, events=[*true, replace(true[0], stamp=3.5, outcomes={"other": "ignored"})])
     (rejected, doubts, used) = (
-        judged(ignored, {"check": "telegrams", "of": "other"} | item)[0]
+        evaluated(ignored, {"check": "telegrams", "of": "other"} | item)[0]
         for item in ({"rejected": 0}, {"ignored": 1}, {"used": 4})
     )
     assert (rejected.passed, rejected.measured) == (False, 1.0)
@@ -171,14 +171,14 @@ def test_what_a_gate_ignored_was_not_taken() -> None:
 
 
 def test_telegrams_that_are_too_many_are_named() -> None:
-    (found,) = judged(hand_made(), {"check": "telegrams", "false": 0})
+    (found,) = evaluated(hand_made(), {"check": "telegrams", "false": 0})
     assert "B at 2 s" in found.text
     assert found.when == 2.0
 
 
 @pytest.mark.parametrize(("of", "passed"), [("observer", True), ("other", False), ("third", True)])
 def test_certificates(of: str, passed: bool) -> None:
-    (found,) = judged(hand_made(), {"check": "certificate", "of": of})
+    (found,) = evaluated(hand_made(), {"check": "certificate", "of": of})
     assert found.passed is passed
 
 
@@ -186,33 +186,33 @@ def test_a_longer_gap_than_certified_is_found() -> None:
     run = hand_made()
     certificates = run.summary["certificates"]
     longer = {**certificates, "observer": {**certificates["observer"], "largest_gap_seen": 3.75}}
-    (found,) = judged(
+    (found,) = evaluated(
         replace(run, summary={**run.summary, "certificates": longer}), {"check": "certificate", "of": "observer"}
     )
     assert (found.passed, found.measured, found.limit) == (False, 3.75, 3.5)
 
 
 def test_certificates_of_all_observers() -> None:
-    assert [j.passed for j in judged(hand_made(), {"check": "certificate"})] == [True, False, True]
+    assert [j.passed for j in evaluated(hand_made(), {"check": "certificate"})] == [True, False, True]
     bare = replace(hand_made(), summary={})
-    assert [j.passed for j in judged(bare, {"check": "certificate"})] == [False]
+    assert [j.passed for j in evaluated(bare, {"check": "certificate"})] == [False]
 
 
 def test_warnings() -> None:
-    good, bad = judged(hand_made(), {"check": "warnings", "at_most": 2}, {"check": "warnings", "at_most": 1})
+    good, bad = evaluated(hand_made(), {"check": "warnings", "at_most": 2}, {"check": "warnings", "at_most": 1})
     assert (good.passed, bad.passed, bad.measured) == (True, False, 2.0)
     assert "the rails are wet" in bad.text
 
 
 def test_errors_count_from_the_start_of_the_evaluation() -> None:
     late = replace(SPEC, evaluate_after=6.0)
-    (after,) = judged(hand_made(), {"check": "speed_error", "max": 0.2}, spec=late)
-    (before,) = judged(hand_made(), {"check": "speed_error", "max": 0.2, "from": 0.0}, spec=late)
+    (after,) = evaluated(hand_made(), {"check": "speed_error", "max": 0.2}, spec=late)
+    (before,) = evaluated(hand_made(), {"check": "speed_error", "max": 0.2, "from": 0.0}, spec=late)
     assert (after.passed, before.passed) == (True, False)
 
 
 def test_several_observers_are_evaluated_one_by_one() -> None:
-    found = judged(hand_made(), {"check": "speed_error", "of": ["observer", "other"], "max": 0.3, "name": "fast"})
+    found = evaluated(hand_made(), {"check": "speed_error", "of": ["observer", "other"], "max": 0.3, "name": "fast"})
     assert [(j.passed, j.number) for j in found] == [(False, 1), (True, 1)]
     assert all(j.name.startswith("fast (") for j in found)
 
@@ -245,21 +245,21 @@ REACHED_AND_OPEN = [
 
 @pytest.mark.parametrize(("item", "passed", "text"), REACHED_AND_OPEN)
 def test_a_run_that_failed_at_6_s(item: dict[str, Any], passed: bool, text: str) -> None:
-    (found,) = judged(hand_made(until=6.0, failure="the wheel came off"), item)
+    (found,) = evaluated(hand_made(until=6.0, failure="the wheel came off"), item)
     assert found.passed is passed
     assert text in found.text
 
 
 def test_a_run_that_ended_as_a_component_asked_is_evaluated_by_what_there_is() -> None:
     ended = hand_made(until=6.0)
-    (whole,) = judged(ended, {"check": "speed_error", "max": 1.0})
-    (asked,) = judged(ended, {"check": "speed_error", "max": 1.0, "to": 9.0})
+    (whole,) = evaluated(ended, {"check": "speed_error", "max": 1.0})
+    (asked,) = evaluated(ended, {"check": "speed_error", "max": 1.0, "to": 9.0})
     assert (whole.passed, asked.passed) == (True, False)
 
 
 def test_a_run_without_rows() -> None:
     empty = hand_made(until=-1.0, failure="nothing worked")
-    found = judged(
+    found = evaluated(
         empty,
         {"check": "speed_error", "max": 1.0},
         {"check": "signal", "signal": "train.speed", "min": 0.0},
@@ -285,21 +285,21 @@ def test_a_run_without_rows() -> None:
 )
 def test_what_is_not_finite_is_never_within_bounds(value: float, item: dict[str, Any]) -> None:
     run = hand_made(changes={"observer.speed": np.where(TIME == 7.0, value, 10.0)})
-    (found,) = judged(run, item)
+    (found,) = evaluated(run, item)
     assert not found.passed
     assert found.when == 7.0
-    (before,) = judged(run, item | {"to": 6.0})
+    (before,) = evaluated(run, item | {"to": 6.0})
     assert before.passed
 
 
 def test_an_indicator_that_is_not_a_number_is_not_off() -> None:
     run = hand_made(changes={"alarm.indicator": np.where(TIME == 7.0, math.nan, 1.0)})
-    (found,) = judged(run, {"check": "off", "signal": "alarm.indicator", "threshold": 1.5})
+    (found,) = evaluated(run, {"check": "off", "signal": "alarm.indicator", "threshold": 1.5})
     assert (found.passed, found.when) == (False, 7.0)
 
 
 def test_a_window_between_two_rows_is_said_to_hold_none() -> None:
-    (found,) = judged(hand_made(), {"check": "speed_error", "max": 1.0, "from": 6.2, "to": 6.8})
+    (found,) = evaluated(hand_made(), {"check": "speed_error", "max": 1.0, "from": 6.2, "to": 6.8})
     assert not found.passed
     assert "no row between 6.2 and 6.8 s" in found.text
 
@@ -308,13 +308,13 @@ def test_a_window_between_two_rows_is_said_to_hold_none() -> None:
     "item", [{"check": "speed_error", "of": "nobody", "max": 1.0}, {"check": "signal", "signal": "a.b", "min": 0.0}]
 )
 def test_what_was_not_recorded_is_said(item: dict[str, Any]) -> None:
-    (found,) = judged(hand_made(), item)
+    (found,) = evaluated(hand_made(), item)
     assert not found.passed
     assert "was not recorded" in found.text
 
 
 def test_without_a_true_value_nothing_is_measured() -> None:
-    (found,) = judged(hand_made(), {"check": "speed_error", "max": 1.0}, spec=ReportSpec(observers=("observer",)))
+    (found,) = evaluated(hand_made(), {"check": "speed_error", "max": 1.0}, spec=ReportSpec(observers=("observer",)))
     assert "true_speed" in found.text
 
 
@@ -343,7 +343,7 @@ def test_the_largest_error_is_that_of_a_plain_loop(ticks: Sequence[int], data: s
         "from": start / 4.0,
         "to": end / 4.0,
     }
-    (found,) = judged(run, item)
+    (found,) = evaluated(run, item)
     assert found.passed is (bool(sizes) and max(sizes) <= limit and 4.0 * time[-1] >= end)
 
 
@@ -369,7 +369,7 @@ def test_first_on_is_that_of_a_fine_walk(ticks: Sequence[int], data: st.DataObje
 
 def outcome(*items: dict[str, Any], failure: str | None = None) -> Outcome:
     run = hand_made(failure=failure)
-    found = [j.to_data() for j in judged(run, *items)]
+    found = [j.to_data() for j in evaluated(run, *items)]
     return Outcome(run, SPEC).with_summary(expectations=found)
 
 
@@ -406,14 +406,16 @@ def test_expectations_survive_the_results_folder(tmp_path: Any) -> None:
     )
     write_results(before.result, tmp_path)
     after = Outcome(read_results(tmp_path), SPEC)
-    same = [replace(a, measured=0.0, when=0.0) == replace(b, measured=0.0, when=0.0) for a, b in zip_all(before, after)]
-    assert same == [True] * 6
+    equal = [
+        replace(a, measured=0.0, when=0.0) == replace(b, measured=0.0, when=0.0) for a, b in zip_all(before, after)
+    ]
+    assert equal == [True] * 6
     for key in ("measured", "when"):
         read, written = ([getattr(j, key) for j in side.expectations] for side in (after, before))
         np.testing.assert_array_equal(read, written)
 
 
-def zip_all(before: Outcome, after: Outcome) -> list[tuple[Judged, Judged]]:
+def zip_all(before: Outcome, after: Outcome) -> list[tuple[Evaluated, Evaluated]]:
     return list(zip(before.expectations, after.expectations, strict=True))
 
 

@@ -104,7 +104,7 @@ def test_without_balises_there_are_no_telegrams(kind: str, components: dict[str,
 
 
 def test_certificates_that_are_ignored_cannot_be_expected(check: Callable[..., ScenarioTable]) -> None:
-    with pytest.raises(ScenarioError, match="leaves nothing to judge"):
+    with pytest.raises(ScenarioError, match="leaves nothing to evaluate"):
         check({"check": "certificate"}, certificates="ignore")
 
 
@@ -237,7 +237,7 @@ class Broken(WindowExpectation):
     def prepare(self, before: Any) -> Any:
         return {"raises": lambda: 1 / 0, "nothing": lambda: None}.get(self.mistake, lambda: self)()
 
-    def judge(self, run: Any) -> Any:
+    def evaluate(self, run: Any) -> Any:
         return 1 / 0 if self.mistake == "later" else "met"
 
 

@@ -198,7 +198,7 @@ def test_in_a_scenario(path: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("more", "told"),
+    ("more", "reported"),
     [
         ({"measurements": {"wheelspeed": 0.1}}, "did you mean 'wheel_speed'"),
         ({"process_noise": {"speeed": 0.1}}, "no state 'speeed'"),
@@ -206,23 +206,23 @@ def test_in_a_scenario(path: Path, tmp_path: Path) -> None:
         ({"states": ["rain_speed"]}, "did you mean 'train_speed'"),
     ],
 )
-def test_mistakes_are_reported(path: Path, more: dict[str, Any], told: str) -> None:
-    with pytest.raises(FmuModelError, match=told):
+def test_mistakes_are_reported(path: Path, more: dict[str, Any], reported: str) -> None:
+    with pytest.raises(FmuModelError, match=reported):
         FmuFilterModel(
             path, FilterTable.model_validate({"kind": "ukf", "measurements": {"wheel_speed": 0.1}} | more), START
         )
 
 
 @pytest.mark.parametrize(
-    ("table", "told"),
+    ("table", "reported"),
     [
         ({"kind": "ukf"}, "needs 'measurements'"),
         ({"kind": "ukf", "measurements": {"speed": 0.0}}, "greater than 0"),
         ({"kind": "kf", "measurements": {"speed": 1.0}}, "'ekf', 'ukf', 'ensemble' or"),
     ],
 )
-def test_tables_that_cannot_be(table: dict[str, Any], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_tables_that_cannot_be(table: dict[str, Any], reported: str) -> None:
+    with pytest.raises(ValueError, match=reported):
         FilterTable.model_validate(table)
 
 
@@ -284,13 +284,13 @@ def test_particles_of_model_exchange_find_what_those_of_co_simulation_do() -> No
 
 def test_a_step_at_which_states_were_not_read_is(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The default experiment has steps of 10 ms: multiples of it need no second look."""
-    looked: list[float] = []
-    monkeypatch.setattr(component, "check_states", lambda _model, h: looked.append(h))
+    read: list[float] = []
+    monkeypatch.setattr(component, "check_states", lambda _model, h: read.append(h))
     inputs = {"effort": 5e4, "measured_wheel_speed": 12.0}
     for dt, expected in ((0.02, [0.01]), (0.004, [0.01, 0.004]), (0.015, [0.01, 0.015])):
-        looked.clear()
+        read.clear()
         made(path, "ekf").step(0.0, inputs, dt)
-        assert looked == expected
+        assert read == expected
 
 
 def test_names_of_an_fmu_become_names_of_signals() -> None:

@@ -145,7 +145,7 @@ def test_command(locomotive: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (["--set", "trainspeed=1"], "did you mean 'train_speed'"),
         (["--outputs", "sped"], "did you mean 'speed'"),
@@ -156,11 +156,11 @@ def test_command(locomotive: Path, tmp_path: Path, capsys: pytest.CaptureFixture
     ],
 )
 def test_mistakes_are_reported(
-    locomotive: Path, words: list[str], told: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    locomotive: Path, words: list[str], reported: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     words = [str(tmp_path / word) if word == "a.txt" else word for word in words]
     assert main(["linearise", str(locomotive), *words]) == 2
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err
 
 
 def test_a_model_without_states_is_reported(capsys: pytest.CaptureFixture[str]) -> None:

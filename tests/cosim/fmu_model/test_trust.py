@@ -62,13 +62,13 @@ def test_prepared_points_are_those_of_the_ordinary_calls(version: int, monkeypat
     assert model._quick is not None
     points, u = np.array([[5.0, 6.0], [12.0, 13.0], [21.0, 22.0]]), np.array([4e4])
     driven = np.array([[4e4, -4e4]])
-    wanted = [SealedModel.states_after(model, 0.0, 0.1, points, given) for given in (u, driven)]
-    looks = SealedModel.outputs_at(model, 0.0, points, u, [2, 0])
+    wanted = [SealedModel.states_after(model, 0.0, 0.1, points, stated) for stated in (u, driven)]
+    readings = SealedModel.outputs_at(model, 0.0, points, u, [2, 0])
     for met in (False, True):  # a step that meets an event goes the ordinary way
         monkeypatch.setattr(model._quick, "_begin", partial(begun, model._quick._begin, model._quick._flags[0], met))
-        for given, states in zip((u, driven), wanted, strict=True):
-            np.testing.assert_array_equal(model.states_after(0.0, 0.1, points, given), states)
-    np.testing.assert_array_equal(model.outputs_at(0.0, points, u, [2, 0]), looks)
+        for stated, states in zip((u, driven), wanted, strict=True):
+            np.testing.assert_array_equal(model.states_after(0.0, 0.1, points, stated), states)
+    np.testing.assert_array_equal(model.outputs_at(0.0, points, u, [2, 0]), readings)
     assert wanted[0][1, 0] != wanted[0][1, 1] != wanted[1][1, 1]
     model.close()
 
@@ -83,12 +83,12 @@ def test_a_step_that_fails_is_reported_in_words() -> None:
 
 def test_model_exchange_is_integrated() -> None:
     model = open_model(fmus.cached_fmu(PLANTS["pendulum"](), fmi_version=3), "model-exchange")
-    same = open_model(fmus.cached_fmu(PLANTS["pendulum"](), fmi_version=3), "co-simulation")
+    equal = open_model(fmus.cached_fmu(PLANTS["pendulum"](), fmi_version=3), "co-simulation")
     x, u = np.full(len(model.states), 0.4), model.start_inputs
-    one, other = (m.transition(0.0, 0.2, x, u)[0] for m in (model, same))
+    one, other = (m.transition(0.0, 0.2, x, u)[0] for m in (model, equal))
     np.testing.assert_allclose(one, other, rtol=1e-8)  # fourth order at 1 ms, and LSODA at 1e-10
     model.close()
-    same.close()
+    equal.close()
 
 
 def test_more_state_than_declared_is_found(tmp_path: Path) -> None:
@@ -183,14 +183,14 @@ def test_steps_of_its_own_that_do_not_fit_are_reported() -> None:
 def test_events_of_model_exchange_are_handled() -> None:
     """A locomotive at rest breaks away where the effort passes its resistance; co-simulation does the same."""
     path = fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=3)
-    model, same = open_model(path, "model-exchange"), open_model(path, "co-simulation")
+    model, equal = open_model(path, "model-exchange"), open_model(path, "co-simulation")
     x = np.zeros(3)
     for t, effort in ((0.0, 0.0), (0.1, 3e4), (0.2, -3e4)):
-        one, other = (m.transition(t, 0.1, x, np.array([effort]))[0] for m in (model, same))
+        one, other = (m.transition(t, 0.1, x, np.array([effort]))[0] for m in (model, equal))
         np.testing.assert_allclose(one, other, rtol=1e-3, atol=3e-4)  # 0.5 ms late at 0.33 m/s2, 0.58 rad/s2
         x = other
     model.close()
-    same.close()
+    equal.close()
 
 
 def test_a_state_that_chatters_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

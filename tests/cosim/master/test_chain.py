@@ -123,9 +123,9 @@ def test_show_lists_the_chains_of_the_run(case: str, tmp_path: Path, monkeypatch
     (master,) = masters
     close(master.plan)
     for step in master.plan.steps:
-        told = " > ".join(structure.part(step.component.name).chain)
-        pattern = re.escape(told).replace(r"chosen\ at\ set\-up", r"[a-z\-]+")
+        reported = " > ".join(structure.part(step.component.name).chain)
+        pattern = re.escape(reported).replace(r"chosen\ at\ set\-up", r"[a-z\-]+")
         assert re.fullmatch(pattern.replace(r"\ \(where\ the\ run\ can\ use\ it\)", ""), " > ".join(step.chain()))
-        assert told in structure.text()
+        assert reported in structure.text()
     lengths = {"balises": 2, "compiled": 2, "slow": 2, "events": 2, "local events": 1}
     assert max(len(part.chain) for part in structure.parts) == lengths.get(case, max(1, 2 * ("told late" in case)))

@@ -204,9 +204,11 @@ def test_a_plant_that_feels_in_an_iterated_loop_what_its_balises_did(version: in
     assert points["r.estimate"].tolist() == [0.0] * 3 + [2.5] * 3 + [5.5] * 5
     np.testing.assert_allclose(np.diff(points["plant.speed"]), 1e-3 * points["r.estimate"][1:], rtol=0.0, atol=1e-12)
     assert seen.master.balises.passed == len(seen.events) == 2
-    for event, k, told in zip(seen.events, (2, 5), (2.5, 5.5), strict=True):  # where it was in the step that was kept
-        place, speed, push = points["plant.position"][k], points["plant.speed"][k], 0.01 * told
-        s = (np.sqrt(speed**2 + 2.0 * push * (told - place)) - speed) / push
+    for event, k, reported in zip(
+        seen.events, (2, 5), (2.5, 5.5), strict=True
+    ):  # where it was in the step that was kept
+        place, speed, push = points["plant.position"][k], points["plant.speed"][k], 0.01 * reported
+        s = (np.sqrt(speed**2 + 2.0 * push * (reported - place)) - speed) / push
         assert event.stamp == pytest.approx(k * 0.1 + s, abs=1e-9)  # promised for 'rollback'
 
 
@@ -448,7 +450,7 @@ def test_what_follows_a_restore_is_bit_identical(
             again += steps(master, k, k + 1)
             assert again[-1] == ahead[0]
             master.system.release(saved)
-        told = [repr(e) for e in master.balises.mailbox.log]  # type: ignore[union-attr]
+        reported = [repr(e) for e in master.balises.mailbox.log]  # type: ignore[union-attr]
     assert again == reference
-    assert told == log
+    assert reported == log
     assert len(log) > 3

@@ -77,9 +77,9 @@ def test_interpolation_alone_is_of_second_order_where_nothing_is_fed_back(tmp_pa
 def test_a_mean_is_not_reported_where_the_output_follows_the_input_at_once(tmp_path: Path) -> None:
     """Documented limit: held inputs that act directly take the value of the end, and stay of first order."""
     means = halved(tmp_path, "force-displacement", inputs="extrapolate")
-    told = halved(tmp_path, "force-displacement", inputs="extrapolate", capabilities={"input_derivatives": True})
+    reported = halved(tmp_path, "force-displacement", inputs="extrapolate", capabilities={"input_derivatives": True})
     assert order(means) == pytest.approx(1.0, abs=0.15)
-    assert order(told) == pytest.approx(2.0, abs=0.15)
+    assert order(reported) == pytest.approx(2.0, abs=0.15)
 
 
 def test_substeps_follow_the_line(tmp_path: Path) -> None:

@@ -74,12 +74,12 @@ def test_an_event_gives_two_rows_before_and_after() -> None:
 
 
 def test_progress_is_reported_up_to_the_end() -> None:
-    told: list[float] = []
+    reported: list[float] = []
     master = prepare([component(Counter(), "c")], [], 0.1, 100)
-    master._progress = told.append
+    master._progress = reported.append
     master.run()
-    assert told[-1] == master.axis.stop
-    assert told == sorted(told)
+    assert reported[-1] == master.axis.stop
+    assert reported == sorted(reported)
     assert master.timing.stepping > 0.0
 
 

@@ -39,13 +39,13 @@ class Part(Mock):
 
     def begin(self) -> None:
         self.x = {"s": 0.1, "r": -0.2}
-        self.given: list[tuple[float, float, dict[str, float]]] = []
+        self.fed: list[tuple[float, float, dict[str, float]]] = []
 
     def compute(self) -> None:
         self.v["y1"], self.v["y2"] = self.x["s"], self.x["r"] + self.gain * self.v["u1"]
 
     def move(self, t: float, h: float) -> None:
-        self.given.append((t, t + h, dict(self.v)))
+        self.fed.append((t, t + h, dict(self.v)))
         self.x["s"] += h * (self.v["u1"] - 0.9 * self.v["u2"] + np.sin(t + len(self.feedthrough)))
         self.x["r"] += h * (0.4 * self.v["u2"] - self.x["s"] ** 3)
 
@@ -143,10 +143,10 @@ def test_a_signal_is_of_one_instant_in_all_its_targets(net: Net, algorithm: str,
         return
     for source in {link.split(" -> ")[0] for link in net.links}:
         targets = [link.split(" -> ")[1].split(".") for link in net.links if link.startswith(f"{source} ->")]
-        given_to = [[values[u] for _, _, values in slaves[name].given] for name, u in targets]
+        fed_to = [[values[u] for _, _, values in slaves[name].fed] for name, u in targets]
         column = table[source]
-        assert given_to[0] in (column[1:].tolist(), column[:-1].tolist())
-        assert all(other == given_to[0] for other in given_to)
+        assert fed_to[0] in (column[1:].tolist(), column[:-1].tolist())
+        assert all(other == fed_to[0] for other in fed_to)
 
 
 class Ends(Part):
@@ -163,7 +163,7 @@ def instants(order: Sequence[str], links: Sequence[str], step: Any) -> dict[str,
     master = prepare(components, links, STEP, 1)
     step(master)
     close(master.plan)
-    return {name: [(t, until, values["u1"]) for t, until, values in slave.given] for name, slave in slaves.items()}
+    return {name: [(t, until, values["u1"]) for t, until, values in slave.fed] for name, slave in slaves.items()}
 
 
 RING = ("a.y1 -> b.u1", "b.y1 -> a.u1", "b.y1 -> c.u1", "b.y1 -> d.u1")
@@ -201,7 +201,7 @@ def test_lines_begin_at_the_instant_of_the_value() -> None:
     master.run()
     close(master.plan)
     for name in "acd":
-        seen = [values["u1"] for _, _, values in slaves[name].given][1:]
+        seen = [values["u1"] for _, _, values in slaves[name].fed][1:]
         # the mean over the step
         np.testing.assert_allclose(seen, STEP * (np.arange(1, COUNT) + 0.5), rtol=0.0, atol=1e-12)
 
@@ -214,7 +214,7 @@ def test_after_a_restore_the_held_value_is_that_of_the_step_taken_again() -> Non
     kept = system.save()
     for until in (0.3, 0.25):
         system.advance(0.2, until)
-        t, end, values = slaves["c"].given[-1]
+        t, end, values = slaves["c"].fed[-1]
         assert (t, end, values["u1"]) == (0.2, until, 0.2)
         system.restore(kept)
     system.release(kept)
@@ -243,11 +243,11 @@ def test_a_signal_that_leaves_an_iterated_loop_is_of_the_end_of_the_step() -> No
     master = prepare({n: component(s, n) for n, s in slaves.items()}, links, STEP, COUNT)
     master.run()
     close(master.plan)
-    told, table = master.system.algorithm.summary(), master.recorder.table()
-    assert told["loops"][0]["components"] == ["a", "b"]
-    assert told["held"] == ["c.y2 -> a.u2"]
-    assert "a.y1 -> c.u1" in told["fresh"]
-    assert [values["u1"] for _, _, values in slaves["c"].given] == table["a.y1"][1:].tolist()
+    reported, table = master.system.algorithm.summary(), master.recorder.table()
+    assert reported["loops"][0]["components"] == ["a", "b"]
+    assert reported["held"] == ["c.y2 -> a.u2"]
+    assert "a.y1 -> c.u1" in reported["fresh"]
+    assert [values["u1"] for _, _, values in slaves["c"].fed] == table["a.y1"][1:].tolist()
 
 
 def test_two_loops_that_take_iterated_signals_of_one_another_are_one() -> None:

@@ -84,11 +84,11 @@ def test_a_system_that_is_exact_is_not_changed_by_steps_that_are_taken_back() ->
     balises = Balises(positions(3.3, 7.1, 11.0), receivers=["listener"])
     seen = run(parts, pairs, 0.1, 15, balises, control=doubling(1e-6))
     again = [block(Motion(), "plant"), block(Listener(), "listener")]
-    told = run(
+    reported = run(
         again, [("plant.speed", "listener.speed")], 0.1, 15, Balises(positions(3.3, 7.1, 11.0), receivers=["listener"])
     )
-    assert seen["listener.heard"][-1] == told["listener.heard"][-1] == 3.0
-    assert [e.identity for e in seen.events] == [e.identity for e in told.events]
+    assert seen["listener.heard"][-1] == reported["listener.heard"][-1] == 3.0
+    assert [e.identity for e in seen.events] == [e.identity for e in reported.events]
     assert seen.master.control.statistics.rejected > 0
     assert seen["plant.position"][np.searchsorted(seen.time, [e.stamp - 1e-9 for e in seen.events])] == pytest.approx(
         [3.3, 7.1, 11.0], abs=1e-9

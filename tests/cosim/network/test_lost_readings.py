@@ -152,16 +152,16 @@ def test_a_reading_is_read_once_however_often_it_is_sampled(name: str) -> None:
     arriving = [(0.0, first), *((p.delivered_at, list(p.values.values())) for p in outcome.result.packets)]
     runtime.u[places] = first
     runtime.start(0.0)
-    told, k = 0, 1
+    reported, k = 0, 1
     while k * period < stop + 1e-9:
         new = [values for at, values in arriving if (k - 1) * period - 1e-9 <= at < k * period - 1e-9]
         runtime.u[places] = new[-1] if new else np.nan
-        told += bool(new)
+        reported += bool(new)
         runtime.advance(k * period)
         k += 1
     runtime.update_outputs()
-    assert told < 0.3 * k  # most samples lie between two packets
-    assert missed(outcome) == (k - 1 - told) * len(sources)
+    assert reported < 0.3 * k  # most samples lie between two packets
+    assert missed(outcome) == (k - 1 - reported) * len(sources)
     expected = dict(zip(scalar_names(system.outputs), runtime.y, strict=True))
     found = {n: outcome[f"observer.{n}"][-1] for n in expected}
     # the block halts where packets arrive, which leaves rounding in what flows; sigma points lose half of the digits

@@ -131,28 +131,28 @@ def test_all_versions_of_fmi_are_notified_equally(tmp_path: Path, *, together: b
     runs = [run(0.01, backend, **network) for backend in ("block3", "block2")]
     names = (*SIGNALS, "listener.packets")
     np.testing.assert_allclose(of(runs[1], *names), of(runs[0], *names), atol=1e-12)
-    told = [[p.outcomes for p in outcome.result.packets] for outcome in runs]
-    assert told[0] == told[1]
+    reported = [[p.outcomes for p in outcome.result.packets] for outcome in runs]
+    assert reported[0] == reported[1]
 
 
 def test_what_was_received_can_be_expected_and_reported() -> None:
     made = scenario(stop=0.5).expect("signal", signal="network.source.sine", max=3.0)
     made.expect("difference", signal="network.source.cosine", reference="source.cosine", max=0.2)
-    assert [judged.passed for judged in made.run(warn=lambda _: None).expectations] == [True, True]
+    assert [evaluated.passed for evaluated in made.run(warn=lambda _: None).expectations] == [True, True]
     with pytest.raises(CosimError, match=r"network: no variable 'source.sin'.*source.sine"):
         scenario(stop=0.5).expect("signal", signal="network.source.sin", max=3.0).run()
 
 
 def test_seeds_and_names_decide_and_the_order_of_components_does_not() -> None:
-    same, other = run(seed=3, **ROUGH), run(seed=4, **ROUGH)
-    assert [p.kind for p in same.result.packets] != [p.kind for p in other.result.packets]
+    equal, other = run(seed=3, **ROUGH), run(seed=4, **ROUGH)
+    assert [p.kind for p in equal.result.packets] != [p.kind for p in other.result.packets]
     turned = scenario(seed=3, **ROUGH)
     data = turned._data
     data["components"] = dict(reversed(data["components"].items()))
     data["connections"] = data["connections"][::-1]
     again = turned.run(warn=lambda _: None)
-    assert again.result.packets == same.result.packets
-    np.testing.assert_array_equal(of(again, *SIGNALS), of(same, *SIGNALS))
+    assert again.result.packets == equal.result.packets
+    np.testing.assert_array_equal(of(again, *SIGNALS), of(equal, *SIGNALS))
 
 
 def test_the_order_of_nodes_changes_nothing_but_round_robin() -> None:

@@ -52,7 +52,7 @@ class Listener(HybridSystem):
     internal_step = 1e-2
     states = (
         state("place", "m", 0.0, "Integral"),
-        memory("told", "m", 0.0, "Last values told", size=2),
+        memory("reported", "m", 0.0, "Last values told", size=2),
         memory("count", "1", 0.0, "Packets told"),
     )
     inputs = (input_signal("speed", "m/s", 1.0, "Speed"), input_signal("held", "m", 0.0, "A held value"))
@@ -79,10 +79,16 @@ class Listener(HybridSystem):
 
     def jump(self, event: str, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
         place = np.where(u.packet_node == 2.0, u.packet_second, x.place)
-        return {"place": place, "told": vector(u.packet_first, u.packet_second), "count": x.count + 1.0}
+        return {"place": place, "reported": vector(u.packet_first, u.packet_second), "count": x.count + 1.0}
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        return {"estimate": x.place, "first": x.told[0], "second": x.told[1], "packets": x.count, "passed_on": u.held}
+        return {
+            "estimate": x.place,
+            "first": x.reported[0],
+            "second": x.reported[1],
+            "packets": x.count,
+            "passed_on": u.held,
+        }
 
 
 def scenario(step: float = 0.01, backend: str = "block3", stop: float = STOP, **network: Any) -> Scenario:

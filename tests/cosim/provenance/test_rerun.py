@@ -13,7 +13,7 @@ from kept_runs import coast, coasting, everything, quietly
 from cosim import Scenario
 from cosim.errors import CosimError, OutputError, ProvenanceError
 from cosim.provenance import rerun
-from cosim.provenance.rerun import _same_result
+from cosim.provenance.rerun import _equal_result
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.results_folder import read_results
 
@@ -137,13 +137,13 @@ def test_an_override_without_target_is_refused(kept: Path) -> None:
 
 def test_warnings_that_are_known_are_not_reported_again(tmp_path: Path) -> None:
     coast(tmp_path)
-    told: list[str] = []
+    reported: list[str] = []
     scenario = coasting(tmp_path).master(threads=2)
-    scenario.run(warn=told.append).write(tmp_path / "out", report=False)
-    assert len(told) == 2  # threads without jacobi; an unconnected input
-    rerun(tmp_path / "out", overrides={"master.tolerance": 1e-3}, warn=told.append)
-    assert len(told) == 3
-    assert "master.tolerance has no effect" in told[2]
+    scenario.run(warn=reported.append).write(tmp_path / "out", report=False)
+    assert len(reported) == 2  # threads without jacobi; an unconnected input
+    rerun(tmp_path / "out", overrides={"master.tolerance": 1e-3}, warn=reported.append)
+    assert len(reported) == 3
+    assert "master.tolerance has no effect" in reported[2]
 
 
 def test_the_call_log_is_not_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,21 +168,21 @@ def result_of(**columns: list[float]) -> Result:
 def test_every_bit_counts_but_for_the_kind_of_a_nan() -> None:
     one = result_of(time=[0.0, 1.0, 2.0], x=[0.0, np.nan, 1.0])
     other = result_of(time=[0.0, 1.0, 2.0], x=[0.0, -np.nan, 1.0])
-    assert _same_result(one, one)
-    assert _same_result(one, other)
-    assert not _same_result(one, result_of(time=[0.0, 1.0, 2.0], x=[-0.0, np.nan, 1.0]))
-    assert not _same_result(one, result_of(time=[0.0, 1.0, 2.0], x=[0.0, np.nan, np.nextafter(1.0, 2.0)]))
-    assert not _same_result(one, result_of(time=[0.0, 1.0, 2.0], y=[0.0, np.nan, 1.0]))
-    assert not _same_result(one, replace(one, table=one.table[:2]))
+    assert _equal_result(one, one)
+    assert _equal_result(one, other)
+    assert not _equal_result(one, result_of(time=[0.0, 1.0, 2.0], x=[-0.0, np.nan, 1.0]))
+    assert not _equal_result(one, result_of(time=[0.0, 1.0, 2.0], x=[0.0, np.nan, np.nextafter(1.0, 2.0)]))
+    assert not _equal_result(one, result_of(time=[0.0, 1.0, 2.0], y=[0.0, np.nan, 1.0]))
+    assert not _equal_result(one, replace(one, table=one.table[:2]))
 
 
 def test_telegrams_count_as_well() -> None:
     record = BaliseRecord(1.0, 1.0, "B1", 5.0, 5.0, outcomes={"a": "accepted"})
     one = replace(result_of(time=[0.0, 1.0, 2.0]), events=[record])
-    assert _same_result(one, replace(one, events=[replace(record)]))  # an odometer reading that is NaN in both
+    assert _equal_result(one, replace(one, events=[replace(record)]))  # an odometer reading that is NaN in both
     later, otherwise = replace(record, stamp=np.nextafter(1.0, 2.0)), replace(record, outcomes={"a": "late"})
     for other in ([], [record, record], [later], [otherwise]):
-        assert not _same_result(one, replace(one, events=other))
+        assert not _equal_result(one, replace(one, events=other))
 
 
 def test_a_results_folder_is_a_scenario(kept: Path) -> None:

@@ -194,18 +194,18 @@ def test_what_a_component_raises_is_reported_in_its_own_words(pytester: pytest.P
     fails = f"*Component 'boiler' at t = 0.2 s: *{failing_models.WORDS}*"
     write(pytester, text, 0.29)
     for options in ([], ["--fmu-baseline=update"], ["--fmu-baseline=diff"]):
-        told = run(pytester, *options)
-        told.assert_outcomes(failed=1)
-        told.stdout.fnmatch_lines([fails])
+        reported = run(pytester, *options)
+        reported.assert_outcomes(failed=1)
+        reported.stdout.fnmatch_lines([fails])
     write(pytester, text, 99.0)
     run(pytester, "--fmu-baseline=update").assert_outcomes(passed=1)
     before = tree(pytester)
     write(pytester, text, 0.29)
     for options in ([], ["--fmu-baseline=update"]):
-        told = run(pytester, *options)
-        told.assert_outcomes(failed=1)
-        told.stdout.fnmatch_lines([fails])
-        told.stdout.no_fnmatch_line("*Traceback*")
+        reported = run(pytester, *options)
+        reported.assert_outcomes(failed=1)
+        reported.stdout.fnmatch_lines([fails])
+        reported.stdout.no_fnmatch_line("*Traceback*")
     assert tree(pytester) == before
 
 
@@ -275,8 +275,8 @@ def test_folders_can_be_chosen_and_what_is_unused_is_reported(pytester: pytest.P
     run(pytester, "--fmu-baseline=update").assert_outcomes(passed=1)
     assert (pytester.path / "kept" / "test_train" / "test_line.json").is_file()
     write(pytester, ONE.replace("test_line", "test_renamed"))
-    told = run(pytester, "--fmu-baseline=update")
-    told.stdout.fnmatch_lines(["Not used by this run: kept*test_line.json"])
+    reported = run(pytester, "--fmu-baseline=update")
+    reported.stdout.fnmatch_lines(["Not used by this run: kept*test_line.json"])
     write(pytester, ONE, 2.0)
     run(pytester).assert_outcomes(failed=1)
     assert list((pytester.path / "seen").rglob("*.html"))
@@ -299,10 +299,10 @@ def test_folders_can_be_chosen_and_what_is_unused_is_reported(pytester: pytest.P
 )
 def test_mistakes_are_reported_in_words(call: str, says: str, pytester: pytest.Pytester) -> None:
     write(pytester, MADE + f"def test_line(fmu_regression):\n    {call}\n")
-    told = run(pytester, "--fmu-baseline=update")
-    told.assert_outcomes(failed=1)
-    told.stdout.fnmatch_lines([says])
-    told.stdout.no_fnmatch_line("*Error: *")
+    reported = run(pytester, "--fmu-baseline=update")
+    reported.assert_outcomes(failed=1)
+    reported.stdout.fnmatch_lines([says])
+    reported.stdout.no_fnmatch_line("*Error: *")
 
 
 def test_scenarios_by_file_and_tolerances_of_the_test_count(pytester: pytest.Pytester) -> None:

@@ -24,15 +24,15 @@ SPEC = ReportSpec(true_position="plant.position", observers=["kf"], labels={"kf"
 COVARIANCE = np.array([[4.0, 1.0], [1.0, 9.0]])
 
 
-def run(told: float = 1.0, *, nis: bool = True, covariance: bool = True, held: int = 1) -> Result:
-    """A filter whose errors have a covariance `told` times as large as it tells, samples independent."""
+def run(reported: float = 1.0, *, nis: bool = True, covariance: bool = True, held: int = 1) -> Result:
+    """A filter whose errors have a covariance `reported` times as large as it reports, samples independent."""
     random = np.random.default_rng(0)
-    errors = random.multivariate_normal(np.zeros(2), told * COVARIANCE, COUNT)
+    errors = random.multivariate_normal(np.zeros(2), reported * COVARIANCE, COUNT)
     columns = {"plant.position": np.arange(COUNT, dtype=float), "plant.angle": np.zeros(COUNT)}
     columns |= {"kf.position": columns["plant.position"] + errors[:, 0], "kf.angle": errors[:, 1]}
     columns |= {"kf.position_std": np.full(COUNT, 2.0), "kf.angle_std": np.full(COUNT, 3.0)}
     if nis:
-        samples = told * random.chisquare(2.0, COUNT // held + 1)
+        samples = reported * random.chisquare(2.0, COUNT // held + 1)
         columns |= {"kf.nis": np.repeat(samples, held)[:COUNT]}
         columns |= {f"kf.innovation_{name}": np.zeros(COUNT) for name in ("position", "angle")}
         columns |= {"kf.innovation_covariance[1]": np.ones(COUNT), "kf.innovation_likelihood": np.zeros(COUNT)}
@@ -142,8 +142,8 @@ def test_sweeps_have_measures_that_are_one_for_a_consistent_filter() -> None:
 
 
 def test_the_share_in_the_legend_is_that_of_the_curve_that_is_drawn() -> None:
-    def share(told: float) -> float:
-        (curve,) = [c for c in NisPanel.draw(run(told), SPEC).get_lines() if "inside" in str(c.get_label())]
+    def share(reported: float) -> float:
+        (curve,) = [c for c in NisPanel.draw(run(reported), SPEC).get_lines() if "inside" in str(c.get_label())]
         return float(str(curve.get_label()).split(": ")[1].split(" %")[0])
 
     assert 90.0 < share(1.0) < 99.0

@@ -12,7 +12,7 @@ import scipy.stats
 
 from cosim.evaluation.fault_detection import (
     FaultDetection,
-    _judged_detections,
+    _evaluated_detections,
     clopper_pearson,
     fault_detection,
     garwood,
@@ -29,7 +29,7 @@ from cosim.studies.measures import detection_measures, measure_unit
 SPEC = ReportSpec(true_position="train.position", true_fault="wheel.active", observers=["o", "alone"])
 
 
-def made(true: list[tuple[float, float]], told: list[tuple[float, float]], stop: float = 100.0) -> Result:
+def made(true: list[tuple[float, float]], reported: list[tuple[float, float]], stop: float = 100.0) -> Result:
     """A run at 10 m/s in rows 0.1 s apart; the observer `o` is 1 m behind, `alone` tells nothing and is 3 m ahead."""
     t = np.round(np.arange(0.0, stop + 0.05, 0.1), 9)
     t = np.sort(np.append(t, 50.0))  # a balise: two rows
@@ -42,7 +42,7 @@ def made(true: list[tuple[float, float]], told: list[tuple[float, float]], stop:
         "train.position": 10.0 * t,
         "wheel.active": on(true),
         "o.position": 10.0 * t - np.where(np.arange(len(t)) < np.searchsorted(t, 50.0) + 1, 1.0, 0.0),
-        "o.odometer_fault": on(told),
+        "o.odometer_fault": on(reported),
         "alone.position": 10.0 * t + 3.0,
     }
     table = np.zeros(len(t), [(name, "f8") for name in columns])
@@ -59,8 +59,8 @@ def cells(found: FaultDetection, limit: float | None = None) -> dict[str, str]:
 
 def test_faults_misses_false_alarms_and_delays() -> None:
     true = [(10.0, 13.0), (20.0, 20.2), (30.0, 31.0)]
-    told = [(10.4, 13.2), (20.5, 21.0), (60.0, 61.0)]  # late by 0.4 s; just after a short one; of no fault
-    result = made(true, told)
+    reported = [(10.4, 13.2), (20.5, 21.0), (60.0, 61.0)]  # late by 0.4 s; just after a short one; of no fault
+    result = made(true, reported)
     (found, alone) = fault_detection(result, SPEC)
     assert (found.faults, found.detected, found.missed, found.detections, found.false) == (3, 2, 1, 3, 1)
     np.testing.assert_allclose(found.start_delays, [0.4, 0.5], atol=1e-9)
@@ -94,22 +94,22 @@ def test_a_detection_that_never_ends_is_reported_so() -> None:
 
 def test_a_detection_is_of_the_fault_in_which_it_begins() -> None:
     """What was on before a fault says nothing of it; two detections may be of one fault."""
-    assert _judged_detections([(1.0, 2.0), (3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([0.5], [2.5], 0)
-    assert _judged_detections([(3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([], [], 1)
-    assert _judged_detections([(1.0, 5.0)], [(1.2, 2.0), (3.0, 5.1)], 10.0) == (
+    assert _evaluated_detections([(1.0, 2.0), (3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([0.5], [2.5], 0)
+    assert _evaluated_detections([(3.0, 4.0)], [(1.5, 4.5)], 10.0) == ([], [], 1)
+    assert _evaluated_detections([(1.0, 5.0)], [(1.2, 2.0), (3.0, 5.1)], 10.0) == (
         [pytest.approx(0.2)],
         [pytest.approx(0.1)],
         0,
     )
-    assert _judged_detections([], [(1.0, 2.0)], 10.0) == ([], [], 1)
+    assert _evaluated_detections([], [(1.0, 2.0)], 10.0) == ([], [], 1)
 
 
-@pytest.mark.parametrize(("limit", "told"), [(None, 1), (0.7, 1), (0.3, 0)])
-def test_a_detection_that_is_late_is_a_miss_and_no_false_alarm(limit: float | None, told: int) -> None:
-    starts, ends, false = _judged_detections([(1.0, 5.0)], [(1.6, 5.0)], 10.0, delay_limit=limit)
-    assert (len(starts), len(ends), false) == (told, told, 0)
+@pytest.mark.parametrize(("limit", "reported"), [(None, 1), (0.7, 1), (0.3, 0)])
+def test_a_detection_that_is_late_is_a_miss_and_no_false_alarm(limit: float | None, reported: int) -> None:
+    starts, ends, false = _evaluated_detections([(1.0, 5.0)], [(1.6, 5.0)], 10.0, delay_limit=limit)
+    assert (len(starts), len(ends), false) == (reported, reported, 0)
     (found, _) = fault_detection(made([(1.0, 5.0)], [(1.6, 5.0)]), replace(SPEC, delay_limit=limit))
-    assert (found.detected, found.missed, found.false) == (told, 1 - told, 0)
+    assert (found.detected, found.missed, found.false) == (reported, 1 - reported, 0)
 
 
 def test_what_is_before_the_evaluation_does_not_count() -> None:
@@ -164,9 +164,9 @@ def test_figure_of_faults_has_a_row_for_the_truth_and_one_for_each_observer_that
     assert not FaultsPanel.available(result, replace(SPEC, true_fault=None))
     axes = FaultsPanel.draw(result, replace(SPEC, labels={"o": "Ours"}), None)
     assert [text.get_text() for text in axes.get_yticklabels()] == ["fault acts", "Ours"]
-    truth, told = (path.get_paths() for path in axes.collections)
+    truth, reported = (path.get_paths() for path in axes.collections)
     assert [(p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in truth] == [(10.0, 13.0)]
-    assert [(p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in told] == [(10.4, 13.2), (60.0, 61.0)]
+    assert [(p.vertices[:, 0].min(), p.vertices[:, 0].max()) for p in reported] == [(10.4, 13.2), (60.0, 61.0)]
     assert axes.get_xlabel() == "Time [s]"
 
 

@@ -91,9 +91,9 @@ def test_an_empty_run_is_named() -> None:
 
 def test_runs_differ_in_colour_or_dashes_and_neighbours_in_both() -> None:
     lines = [run_line(i) for i in range(MOST_RUNS)]
-    looks = [(to_hex(line["color"]), str(line["linestyle"])) for line in lines]
-    assert len(set(looks)) == MOST_RUNS
-    assert all(a[0] != b[0] and a[1] != b[1] for a, b in pairwise(looks))
+    readings = [(to_hex(line["color"]), str(line["linestyle"])) for line in lines]
+    assert len(set(readings)) == MOST_RUNS
+    assert all(a[0] != b[0] and a[1] != b[1] for a, b in pairwise(readings))
 
 
 def test_each_observer_has_a_panel_with_a_line_for_each_run() -> None:
@@ -225,9 +225,9 @@ def test_layouts_are_compared_by_place_or_instant() -> None:
     assert "All runs pass the same balises" in layout_note(runs)
     moved = [replace(e, true_position=e.true_position + 1.0, stamp=e.stamp + 0.1) for e in runs[1].result.events]
     later = [replace(e, stamp=e.stamp + 0.1) for e in runs[1].result.events]
-    for events, same in ((moved, False), (later, True), (moved[1:], False), ((), False)):
+    for events, equal in ((moved, False), (later, True), (moved[1:], False), ((), False)):
         other = make_runs([runs[0].result, replace(runs[1].result, events=events)], [SPEC, SPEC], ["a", "b"])
-        assert ("All runs pass" in layout_note(other)) is same
+        assert ("All runs pass" in layout_note(other)) is equal
     none = make_runs([replace(r.result, events=()) for r in runs], [SPEC, SPEC], ["a", "b"])
     assert layout_note(none) == ""
 

@@ -101,12 +101,12 @@ def test_a_phase_after_the_journey_is_reported() -> None:
     assert "journey" not in text.partition(":")[2]
 
 
-@pytest.mark.parametrize(("wrong", "told"), [(9.0, False), (11.0, True), (np.inf, True), (np.nan, True)])
-def test_an_observer_that_is_worse_than_none_is_reported(wrong: float, told: bool) -> None:
+@pytest.mark.parametrize(("wrong", "reported"), [(9.0, False), (11.0, True), (np.inf, True), (np.nan, True)])
+def test_an_observer_that_is_worse_than_none_is_reported(wrong: float, reported: bool) -> None:
     estimate = np.full(101, 10.0)
     estimate[60] += wrong
     texts = result_warnings(run(np.full(101, 10.0), estimate), SPEC)
-    assert ["obs: its speed error" in text for text in texts] == [True] * told
+    assert ["obs: its speed error" in text for text in texts] == [True] * reported
     assert result_warnings(run(np.full(101, 10.0), estimate), replace(SPEC, evaluate_after=6.5)) == []
 
 
@@ -148,7 +148,7 @@ def test_the_card_shows_the_worst_of_the_observers() -> None:
 
 
 def test_what_was_delivered_and_what_became_of_it_stand_together() -> None:
-    outcomes = ["accepted"] * 5 + ["undelivered", "doubted", "told"]
+    outcomes = ["accepted"] * 5 + ["undelivered", "doubted", "notified"]
     events = [BaliseRecord(float(i), i + 0.1, f"B{i}", 0.0, 0.0, outcomes={"obs": o}) for i, o in enumerate(outcomes)]
     counts = count_events([*events, BaliseRecord(9.0, np.nan, "M", 0.0, 0.0, kind="missed")])
     assert (counts.delivered, counts.undelivered, counts.missed) == (7, 1, 1)
@@ -156,7 +156,7 @@ def test_what_was_delivered_and_what_became_of_it_stand_together() -> None:
     columns = outcome_columns(counts.outcomes.values())
     assert columns == {
         "accepted": "accepted",
-        "told": "delivered, outcome not reported",
+        "notified": "delivered, outcome not reported",
         "undelivered": "undelivered",
         "doubted": "doubted",
     }
@@ -183,7 +183,7 @@ def test_a_run_that_ends_before_anything_happens() -> None:
         scenario.set(name, 0.0)
     outcome = scenario.run()
     assert outcome.failure is None
-    assert [judged.passed for judged in outcome.expectations] == [False, False, False]
+    assert [evaluated.passed for evaluated in outcome.expectations] == [False, False, False]
     assert all("0.5" in j.text or "nothing" in j.text or "no gap" in j.text for j in outcome.expectations)
     assert [("never moves" in w, "Not reached" in w) for w in outcome.warnings][-2:] == [(True, False), (False, True)]
     assert all(np.isnan(value) for value in error_measures(outcome).values())

@@ -23,14 +23,14 @@ from cosim.results.result import BaliseRecord, Result
 
 SPEC = ReportSpec(true_position="train.position", true_speed="train.speed", true_slip="train.slip", observers=["obs"])
 EXACT = 1e-12  # sums of a hundred numbers of size 1
-TOLD = {"obs": "accepted"}
+REPORTED = {"obs": "accepted"}
 
 
 def telegram(
     stamp: float, delay: float = 0.0, kind: str = "true", outcome: str = "accepted", name: str = "B1"
 ) -> BaliseRecord:
-    told = {} if kind == "missed" else {"obs": outcome}
-    return BaliseRecord(stamp, stamp + delay, name, 0.0, 0.0, kind=kind, outcomes=told)  # type: ignore[arg-type]
+    reported = {} if kind == "missed" else {"obs": outcome}
+    return BaliseRecord(stamp, stamp + delay, name, 0.0, 0.0, kind=kind, outcomes=reported)  # type: ignore[arg-type]
 
 
 def hand_made(
@@ -42,8 +42,10 @@ def hand_made(
     """A run of 100 s with rows every 0.1 s, two at each delivery; the true values are zero, so that estimates are
     errors.
     """
-    told = [e.delivered_at for e in events if math.isfinite(e.delivered_at)]
-    time = np.sort(np.concatenate([np.arange(1001) / 10, told, [t for t in told if t not in np.arange(1001) / 10]]))
+    reported = [e.delivered_at for e in events if math.isfinite(e.delivered_at)]
+    time = np.sort(
+        np.concatenate([np.arange(1001) / 10, reported, [t for t in reported if t not in np.arange(1001) / 10]])
+    )
     zero = np.zeros(len(time))
     columns = {"train.position": zero, "train.speed": zero, "train.slip": zero}
     columns |= {"obs.position": zero if position is None else position, "obs.speed": zero if speed is None else speed}

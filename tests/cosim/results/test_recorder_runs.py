@@ -29,8 +29,8 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(**master: Any) -> Outcome:
-    given = {"certificates": "ignore", "report.tables": ["csv", "mat"]}
-    return small(master=master).run(overrides=given, warn=lambda _text: None)
+    stated = {"certificates": "ignore", "report.tables": ["csv", "mat"]}
+    return small(master=master).run(overrides=stated, warn=lambda _text: None)
 
 
 def test_a_run_that_outgrows_its_memory_is_an_equal_run(tmp_path: Path) -> None:

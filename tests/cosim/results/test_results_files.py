@@ -65,7 +65,7 @@ def result() -> Result:
     return Result(table, signals, events, {"step": 0.1, "warnings": ["été"]}, "stopped")
 
 
-def same_events(first: Any, second: Any) -> bool:
+def equal_events(first: Any, second: Any) -> bool:
     return repr(list(first)) == repr(list(second))  # repr, since NaN differs from itself
 
 
@@ -127,7 +127,7 @@ def test_mat_reads_back_bit_by_bit(result: Result, tmp_path: Path) -> None:
     back = MatFormat.read(tmp_path / "t.mat")
     assert bits(back.table) == bits(result.table)
     assert list(back.signals) == list(result.signals)
-    assert same_events(back.events, result.events)
+    assert equal_events(back.events, result.events)
 
 
 @pytest.mark.parametrize("rows", [0, 1, 2])
@@ -137,7 +137,7 @@ def test_mat_of_few_rows_and_telegrams(rows: int, telegrams: int, result: Result
     MatFormat.write(tmp_path / "t.mat", small)
     back = MatFormat.read(tmp_path / "t.mat")
     assert bits(back.table) == bits(small.table)
-    assert same_events(back.events, small.events)
+    assert equal_events(back.events, small.events)
 
 
 def test_mat_of_time_alone(tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_matlab_names_are_unique_identifiers(names: list[str]) -> None:
 
 def test_events_read_back(result: Result, tmp_path: Path) -> None:
     TELEGRAM_ROWS.write(tmp_path / "e.csv", result.events)
-    assert same_events(TELEGRAM_ROWS.read(tmp_path / "e.csv"), result.events)
+    assert equal_events(TELEGRAM_ROWS.read(tmp_path / "e.csv"), result.events)
 
 
 @given(
@@ -187,6 +187,12 @@ def test_events_read_back(result: Result, tmp_path: Path) -> None:
 )
 def test_outcomes_read_back(outcomes: dict[str, str]) -> None:
     assert parse_outcomes(_outcomes_text(outcomes)) == outcomes
+
+
+def test_an_outcome_of_an_earlier_version_is_read_under_its_name_of_today(result: Result, tmp_path: Path) -> None:
+    TELEGRAM_ROWS.write(tmp_path / "e.csv", [replace(result.events[0], outcomes={"observer": "told", "told": "late"})])
+    (event,) = TELEGRAM_ROWS.read(tmp_path / "e.csv")
+    assert event.outcomes == {"observer": "notified", "told": "late"}
 
 
 def test_broken_event_row_names_its_line(result: Result, tmp_path: Path) -> None:
@@ -220,7 +226,7 @@ def test_folder_reads_back(formats: tuple[str, ...], result: Result, tmp_path: P
     assert sorted(p.name for p in (tmp_path / "new" / "out").iterdir()) == sorted(p.name for p in paths.values())
     assert bits(back.table) == bits(result.table)
     assert list(back.signals) == list(result.signals)
-    assert same_events(back.events, result.events)
+    assert equal_events(back.events, result.events)
     assert (back.summary, back.failure) == (result.summary, result.failure)
 
 

@@ -197,7 +197,7 @@ def test_broken_file_is_a_result_or_refused_in_words(
     broken = path.with_name(f"broken_{name}")
     broken.write_bytes(content)
     try:
-        told = load_result(broken).summary["file"]
+        reported = load_result(broken).summary["file"]
     except OutputError as error:
-        told = str(error)
-    assert str(broken) in told
+        reported = str(error)
+    assert str(broken) in reported

@@ -15,7 +15,7 @@ import pytest
 import sdf
 import xarray as xr
 from hypothesis import given, settings
-from odd_results import NAMES, assert_same, bits, odd_result, results
+from odd_results import NAMES, assert_equal, bits, odd_result, results
 from scipy.io import loadmat
 
 from cosim import load_result
@@ -44,8 +44,8 @@ def test_odd_results_are_read_back(name: str, rows: int, telegrams: int, tmp_pat
     path = written(result, tmp_path, name)
     assert bits(FORMATS[name].read(path).table) == bits(result.table)
     if name in COMPLETE:
-        assert_same(result, FORMATS[name].read(path))
-        assert_same(result, load_result(path))
+        assert_equal(result, FORMATS[name].read(path))
+        assert_equal(result, load_result(path))
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -53,7 +53,7 @@ def test_odd_results_are_read_back(name: str, rows: int, telegrams: int, tmp_pat
 def test_few_columns_are_read_back(name: str, names: tuple[str, ...], tmp_path: Path) -> None:
     result = odd_result(3, names)
     back = FORMATS[name].read(written(result, tmp_path, name))
-    assert_same(result, back if name in COMPLETE else replace(result, table=back.table))
+    assert_equal(result, back if name in COMPLETE else replace(result, table=back.table))
 
 
 @settings(max_examples=40, deadline=None)
@@ -62,7 +62,7 @@ def test_few_columns_are_read_back(name: str, names: tuple[str, ...], tmp_path: 
 def test_any_result_is_read_back(name: str, result: Result, tmp_path_factory: pytest.TempPathFactory) -> None:
     path = written(result, tmp_path_factory.mktemp("any"), name)
     back = FORMATS[name].read(path)
-    assert_same(result, back if name in COMPLETE else replace(result, table=back.table))
+    assert_equal(result, back if name in COMPLETE else replace(result, table=back.table))
 
 
 @pytest.mark.parametrize("name", [name for name in FORMATS if name != "hdf5"])
@@ -83,7 +83,7 @@ def test_blocks_make_one_table(name: str, tmp_path: Path, monkeypatch: pytest.Mo
     mapped = np.memmap(tmp_path / "rows", result.table.dtype, "w+", shape=(101,))
     mapped[:] = result.table
     monkeypatch.setattr(about.blocks, "__defaults__", (7 * result.table.dtype.itemsize,))
-    assert_same(result, load_result(written(replace(result, table=mapped), tmp_path, name)))
+    assert_equal(result, load_result(written(replace(result, table=mapped), tmp_path, name)))
     assert [len(rows) for _, rows in about.blocks(mapped)] == [7] * 14 + [3]
 
 
@@ -191,11 +191,11 @@ def test_any_table_of_a_folder_brings_its_units_and_telegrams(name: str, tmp_pat
     paths = write_results(result, tmp_path / "out", tuple(FORMATS))
     for kind in set(FORMATS) - {name}:
         paths[kind].write_bytes(b"not read")
-    assert_same(result, load_result(paths[name]))
+    assert_equal(result, load_result(paths[name]))
     paths = write_results(result, tmp_path / "out", (name,))
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(p.name for p in paths.values())
-    assert_same(result, read_results(tmp_path / "out"))
-    assert_same(result, load_result(tmp_path / "out"))
+    assert_equal(result, read_results(tmp_path / "out"))
+    assert_equal(result, load_result(tmp_path / "out"))
 
 
 def test_format_without_its_package_is_refused_before_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,7 +212,7 @@ def test_folder_is_read_from_a_table_whose_package_is_there(tmp_path: Path, monk
     write_results(odd_result(), tmp_path, ("parquet", "csv"))
     (tmp_path / "table.parquet").write_bytes(b"")
     monkeypatch.setattr("cosim.results.results_folder.is_installed", lambda _: False)
-    assert_same(odd_result(), read_results(tmp_path))
+    assert_equal(odd_result(), read_results(tmp_path))
 
 
 # --- one file ---------------------------------------------------------------------------------------------------------

@@ -20,7 +20,10 @@ from cosim.scenario.shipped import SHIPPED
 
 FILE = "amsterdam_utrecht_balise_groups.csv"
 ROOT = Path(__file__).parents[3]
-TOLD, UNTOLD = ("quasi_lpv_uio", "discrete_measurement_observer"), ("odometer_reset", "continuous_discrete_observer")
+REPORTED, UNTOLD = (
+    ("quasi_lpv_uio", "discrete_measurement_observer"),
+    ("odometer_reset", "continuous_discrete_observer"),
+)
 
 
 def layout() -> TrackLayout:
@@ -123,7 +126,7 @@ def test_jams_cost_their_length_those_who_are_not_notified() -> None:
     # the driver acts every 50 ms, in which a speed changes by 0.025 m/s; readings are whole pulses of 0.03 m
     for name in (PLAIN_ODOMETER, "odometer_reset"):
         assert quiet.errors[name][i] - found.errors[name][i] == pytest.approx(lost, abs=0.2)
-    for name in TOLD:
+    for name in REPORTED:
         assert abs(found.errors[name][i] - quiet.errors[name][i]) < 0.05 * lost
 
 
@@ -132,13 +135,13 @@ def test_jams_cost_their_length_those_who_are_not_notified() -> None:
 def test_faults_of_the_other_sign_are_those_faults() -> None:
     """What the wheel loses in a jam it wins in a skid of that depth: the plain odometer, by hand as above."""
     outcome, found = shipped(turned=True)
-    given, quiet = shipped()[1], shipped(faults=False)[1]
-    lost, won = (np.array(e.errors[PLAIN_ODOMETER]) - quiet.errors[PLAIN_ODOMETER] for e in (given, found))
+    stated, quiet = shipped()[1], shipped(faults=False)[1]
+    lost, won = (np.array(e.errors[PLAIN_ODOMETER]) - quiet.errors[PLAIN_ODOMETER] for e in (stated, found))
     np.testing.assert_allclose(won, -lost, atol=0.4)  # twice the pulse of 0.03 m, and a reading of 0.2 s
     assert np.abs(lost).max() > 70.0
-    told = {entry["observer"]: entry for entry in outcome.result.summary["fault_detection"]}
-    assert told["quasi_lpv_uio"]["detected"] >= 15
-    for name, limit in zip(TOLD, (27.0, 24.3), strict=True):  # jams of a driven wheel are followed after 1.2 s
+    reported = {entry["observer"]: entry for entry in outcome.result.summary["fault_detection"]}
+    assert reported["quasi_lpv_uio"]["detected"] >= 15
+    for name, limit in zip(REPORTED, (27.0, 24.3), strict=True):  # jams of a driven wheel are followed after 1.2 s
         assert np.abs(found.errors[name]).max() < limit
     assert (
         outcome["discrete_measurement_observer.error_bound"]
@@ -169,7 +172,7 @@ def test_the_train_does_not_know_of_the_communication_step() -> None:
     kept = {"driver__every": 5, "wheel__every": 5, "tachometer__every": 5}
     _, fine = study().run(study().scenario(everybody=False, step=0.01, **kept))
     _, usual = shipped()
-    for name in (*TOLD, "adaptive_gain_cdo", "multirate_cdo", "discrete_uio"):
+    for name in (*REPORTED, "adaptive_gain_cdo", "multirate_cdo", "discrete_uio"):
         np.testing.assert_allclose(fine.errors[name], usual.errors[name], atol=1e-9)  # of 33 km, in doubles
 
 

@@ -107,7 +107,7 @@ def run(made: Scenario, **overrides: Any) -> tuple[Outcome, list[str]]:
     return outcome, said
 
 
-def assert_same(one: Outcome, other: Outcome) -> None:
+def assert_equal(one: Outcome, other: Outcome) -> None:
     np.testing.assert_array_equal(one.result.table, other.result.table)
     assert [e.outcomes for e in one.result.events] == [e.outcomes for e in other.result.events]
     assert len(one.result.events) == 2
@@ -130,10 +130,10 @@ def test_native_where_not_said_otherwise_built_once_and_reported(tmp_path: Path)
     assert [s.name for s in outcome.result.signals if "events." in s.name] == ["reckoning.events.accepted"]
     again, said = run(made)
     assert said == []
-    assert_same(again, outcome)
+    assert_equal(again, outcome)
     for backend in ("block3", "block2", "fmu2"):
-        same, _ = run(made, **{f"{name}.as": backend for name in ("reckoning", "reckoning2")})
-        assert_same(same, outcome)
+        equal, _ = run(made, **{f"{name}.as": backend for name in ("reckoning", "reckoning2")})
+        assert_equal(equal, outcome)
 
 
 @pytest.mark.usefixtures("no_compiler")

@@ -266,12 +266,12 @@ def test_a_run_that_turns_to_nan_keeps_its_rows_and_ends_with_2(
     ],
 )
 def test_a_setting_without_effect_is_reported(key: str, value: float, needed: str) -> None:
-    told: list[str] = []
-    small().run(overrides={f"master.{key}": value, "stop": 0.02}, warn=told.append)
-    assert f"master.{key} has no effect without master.{needed}." in told
+    reported: list[str] = []
+    small().run(overrides={f"master.{key}": value, "stop": 0.02}, warn=reported.append)
+    assert f"master.{key} has no effect without master.{needed}." in reported
     name, wanted = needed.replace("'", "").split(" = ")
-    small().run(overrides={f"master.{key}": value, f"master.{name}": wanted, "stop": 0.02}, warn=told.append)
-    assert sum("has no effect" in text for text in told) == 1
+    small().run(overrides={f"master.{key}": value, f"master.{name}": wanted, "stop": 0.02}, warn=reported.append)
+    assert sum("has no effect" in text for text in reported) == 1
 
 
 @pytest.mark.parametrize(

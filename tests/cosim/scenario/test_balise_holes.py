@@ -51,7 +51,7 @@ def test_a_gain_that_starts_sharp_finds_a_wrong_speed_and_misreads_a_wrong_place
 
 
 def test_all_expectations_are_met() -> None:
-    assert all(judged.passed for judged in run().expectations)
+    assert all(evaluated.passed for evaluated in run().expectations)
 
 
 def test_the_step_does_not_matter() -> None:

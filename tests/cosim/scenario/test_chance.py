@@ -177,9 +177,9 @@ def test_what_a_network_draws_is_independent_of_all_else_with_one_seed() -> None
 def test_what_befalls_telegrams_is_independent_of_all_else_with_one_seed() -> None:
     """Misses, latencies and position errors, where sensors, network, faults and filters have the seed too."""
     channel, count = Channel(latency_jitter=1.0, missed_fraction=0.3, position_noise=1.0, seed=6), 2000
-    told = [channel.transmit(Crossing(0.0, 0.0, "B1", 1.0), k, 0.0) for k in range(count)]
-    read = np.array([e.kind == "true" for e in told])
-    late, error = np.array([e.delivered_at for e in told]), np.array([e.position for e in told])
+    reported = [channel.transmit(Crossing(0.0, 0.0, "B1", 1.0), k, 0.0) for k in range(count)]
+    read = np.array([e.kind == "true" for e in reported])
+    late, error = np.array([e.delivered_at for e in reported]), np.array([e.position for e in reported])
     for purpose in set(Purpose) - {Purpose.TELEGRAMS}:
         for j in range(4):
             noise = np.array([standard_normal(6, j, k, purpose) for k in range(count)])
@@ -247,8 +247,8 @@ def test_a_package_for_other_tools_draws_as_the_scenario(tmp_path: Path, seed: i
     again = Scenario.load(tmp_path / "one.ssp")
     np.testing.assert_array_equal(quiet(again)["one.reading"], quiet(scenario)["one.reading"])
     with ZipFile(tmp_path / "one.ssp") as package:
-        told = 'name="seed"' in package.read("resources/one.ssv").decode()
-    assert told == (seed != RUN_SEED)
+        reported = 'name="seed"' in package.read("resources/one.ssv").decode()
+    assert reported == (seed != RUN_SEED)
 
 
 @pytest.mark.compiler

@@ -22,14 +22,14 @@ def windowed(rows: int, **tables: str) -> Scenario:
 
 def test_of_what_ships_one_printed_filter_alone_is_reported() -> None:
     """Its own page says that currents along d and q do not tell the angle: Allaoui 2024, rank 3 of 4."""
-    told = {
+    reported = {
         name: warnings
         for name in SHIPPED
         if (warnings := evaluate_observers(Scenario.load(name).table().components, {}, "warn", name)[1])
     }
-    assert list(told) == ["traction_drive"]
-    assert "filter: its condition DOES NOT HOLD" in told["traction_drive"][0]
-    assert "rank = 3, order = 4" in told["traction_drive"][0]
+    assert list(reported) == ["traction_drive"]
+    assert "filter: its condition DOES NOT HOLD" in reported["traction_drive"][0]
+    assert "rank = 3, order = 4" in reported["traction_drive"][0]
 
 
 def test_a_window_that_does_not_show_a_state_is_reported_before_the_run() -> None:
@@ -39,7 +39,7 @@ def test_a_window_that_does_not_show_a_state_is_reported_before_the_run() -> Non
     assert any("observer: A window of 1 full row shows 1" in text and "does not show rate" in text for text in heard)
     heard.clear()
     windowed(2).run(warn=heard.append)
-    assert not any("tell" in text and "window" in text for text in heard)
+    assert not any("report" in text and "window" in text for text in heard)
 
 
 def test_it_may_be_required_or_left_aside() -> None:

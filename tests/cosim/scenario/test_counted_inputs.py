@@ -16,7 +16,7 @@ def odometer(step: float, count: str = "wheel_distance", inputs: str = "hold") -
     scenario.set("master.inputs", inputs)
     free = dict.fromkeys(("davis_a", "davis_b", "davis_c"), 0.0)
     scenario.add("train", model="longitudinal_train", parameters={"train_speed": 30.0, **free})
-    scenario.add("wheel", model="wheel_fault", options={"cause": "given", "fault_count": 1})
+    scenario.add("wheel", model="wheel_fault", options={"cause": "stated", "fault_count": 1})
     scenario.add("odometer", model="pulse_odometer", options={"count_from": count}, parameters={"teeth": 1e5})
     scenario.connect("train.wheel_speed -> wheel.speed", "wheel.wheel_speed -> odometer.wheel_speed")
     scenario.set("wheel.fault_onset", [1e3])
@@ -30,14 +30,14 @@ def odometer(step: float, count: str = "wheel_distance", inputs: str = "hold") -
 
 @pytest.mark.parametrize("step", [0.03, 0.08, 0.15, 0.3])
 def test_a_period_that_ends_between_points_is_reported(step: float) -> None:
-    told, wrong = odometer(step)
-    assert len(told) == 1
-    assert "odometer: reading counts wheel_distance every 0.2 s (aggregation_period)" in told[0]
+    reported, wrong = odometer(step)
+    assert len(reported) == 1
+    assert "odometer: reading counts wheel_distance every 0.2 s (aggregation_period)" in reported[0]
     assert wrong > 1.0  # of 30 m/s: what the text is about
 
 
 @pytest.mark.parametrize(("step", "count"), [(0.05, "wheel_distance"), (0.2, "wheel_distance"), (0.03, "wheel_speed")])
 def test_nothing_is_reported_where_the_reading_is_right(step: float, count: str) -> None:
-    told, wrong = odometer(step, count)
-    assert not told
+    reported, wrong = odometer(step, count)
+    assert not reported
     assert wrong < 0.1

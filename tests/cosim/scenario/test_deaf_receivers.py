@@ -22,8 +22,8 @@ def _has_position(system: GatedObserver) -> bool:
 @cache
 def cases() -> list[tuple[str, str | None]]:
     systems = {name: shipped(name) for name in OBSERVERS}
-    told = {n: s for n, s in systems.items() if isinstance(s, GatedObserver) and s.gated and _has_position(s)}
-    return [(name, preset) for name, system in told.items() for preset in system.presets or (None,)]
+    reported = {n: s for n, s in systems.items() if isinstance(s, GatedObserver) and s.gated and _has_position(s)}
+    return [(name, preset) for name, system in reported.items() for preset in system.presets or (None,)]
 
 
 @cache
@@ -69,18 +69,18 @@ FIRST = {name: (name, preset) for name, preset in reversed(cases())}  # of each 
 
 @pytest.mark.parametrize(("name", "preset"), sorted({*FIRST.values(), *(c for c in cases() if c[1] == "gps")}, key=str))
 def test_a_deaf_observer_is_reported_before_the_run(name: str, preset: str | None) -> None:
-    told = warned(name, preset)
-    assert bool(told) == (not moved(name, preset)), told
-    if told:
-        assert "nothing is connected to its event 'gps'" in told[0]
+    reported = warned(name, preset)
+    assert bool(reported) == (not moved(name, preset)), reported
+    if reported:
+        assert "nothing is connected to its event 'gps'" in reported[0]
 
 
-@pytest.mark.parametrize(("mass", "told"), [(873e3, 0), (120e3, 1), (2000e3, 1)])
-def test_a_preset_of_another_train_is_reported_before_the_run(mass: float, told: int) -> None:
+@pytest.mark.parametrize(("mass", "reported"), [(873e3, 0), (120e3, 1), (2000e3, 1)])
+def test_a_preset_of_another_train_is_reported_before_the_run(mass: float, reported: int) -> None:
     scenario = cosim.Scenario(stop=0.2, step=0.1)
     scenario.add("observer", observer="balise_odometer_ekf", preset="tuned", parameters={"mass": mass, "odometer": 0.0})
     texts: list[str] = []
     scenario.run(warn=texts.append)
     found = [text for text in texts if "is made for" in text]
-    assert len(found) == told
+    assert len(found) == reported
     assert all(f"and here mass = {mass:g}" in text for text in found)

@@ -55,10 +55,10 @@ def test_medians_over_ten_seeds_agree_in_size_with_the_independent_ones(
     assert independent / 1.5 < median(observer, phase) < independent * 1.5
 
 
-@pytest.mark.parametrize(("phase", "told"), [(TRACTION, 0.116), (HOLD, 0.348), (BRAKING, 0.140)])
-def test_medians_of_the_unknown_input_observer_are_those_that_the_scenario_states(phase: str, told: float) -> None:
+@pytest.mark.parametrize(("phase", "reported"), [(TRACTION, 0.116), (HOLD, 0.348), (BRAKING, 0.140)])
+def test_medians_of_the_unknown_input_observer_are_those_that_the_scenario_states(phase: str, reported: float) -> None:
     # Nothing independent stands beside S5: what there is had another gain, and a position every 0.1 s.
-    assert median("discrete_uio", phase) == pytest.approx(told, rel=0.02)
+    assert median("discrete_uio", phase) == pytest.approx(reported, rel=0.02)
 
 
 def test_feeding_the_adhesion_force_beats_feeding_the_effort() -> None:

@@ -135,12 +135,12 @@ def test_the_adapting_observer_runs_over_balises_laid_by_distance() -> None:
 
 
 def test_balises_before_the_start_of_the_track_do_not_count() -> None:
-    told = {"position": "a.p", "speed": "a.v", "layout": "positions", "positions": [0.0, 900.0, 1000.0, 1300.0]}
-    layout = by_positions(told["positions"])
-    whole = BalisesTable.model_validate(told | {"expected_speed": 10.0})
+    reported = {"position": "a.p", "speed": "a.v", "layout": "positions", "positions": [0.0, 900.0, 1000.0, 1300.0]}
+    layout = by_positions(reported["positions"])
+    whole = BalisesTable.model_validate(reported | {"expected_speed": 10.0})
     assert expected_gap(layout, whole, 0.0).seconds == 90.0
-    later = BalisesTable.model_validate(told | {"expected_speed": 10.0, "track_start": 950.0})
+    later = BalisesTable.model_validate(reported | {"expected_speed": 10.0, "track_start": 950.0})
     assert expected_gap(layout, later, 0.0).seconds == 30.0
     assert expected_gap(layout, later, 0.0).spacings == (300.0, 300.0)
-    behind = BalisesTable.model_validate(told | {"expected_speed": 10.0, "track_start": 2000.0})
+    behind = BalisesTable.model_validate(reported | {"expected_speed": 10.0, "track_start": 2000.0})
     assert "no balise lies behind" in expected_gap(layout, behind, 0.0).reason

@@ -51,7 +51,7 @@ def test_measures_cards_and_expectations_need_no_report_table() -> None:
     outcome = silent(expect=[{"check": "speed_error", "max": 1.0}]).run()
     error = np.abs(outcome["observer.speed"] - outcome["locomotive.speed"]).max()
     assert error_measures(outcome)["observer.speed_error_max"] == pytest.approx(error, abs=1e-12)
-    assert [judged.passed for judged in outcome.expectations] == [True]
+    assert [evaluated.passed for evaluated in outcome.expectations] == [True]
     assert {"Largest speed error", "Largest position error"} <= {
         fact[0] for fact in run_statements(outcome.result, outcome.spec)
     }

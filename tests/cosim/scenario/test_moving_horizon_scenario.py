@@ -11,20 +11,22 @@ WINDOW, SQUARES, FILTER = "moving_horizon", "squares", "ekf"
 
 
 def _run(*times: float) -> Outcome:
-    told = [{"time": time, "offset": 25.0} for time in times]
-    outcome = Scenario.load("moving_horizon").run(warn=lambda _text: None, overrides={"balises.false_telegrams": told})
+    reported = [{"time": time, "offset": 25.0} for time in times]
+    outcome = Scenario.load("moving_horizon").run(
+        warn=lambda _text: None, overrides={"balises.false_telegrams": reported}
+    )
     assert outcome.failure is None
     return outcome
 
 
 def _off(outcome: Outcome, name: str, start: float = 6.0, end: float = 90.0) -> float:
-    judged = (outcome.result.time > start) & (outcome.result.time < end)
-    return float(np.abs(outcome[f"{name}.position"] - outcome["train.position"])[judged].max())
+    evaluated = (outcome.result.time > start) & (outcome.result.time < end)
+    return float(np.abs(outcome[f"{name}.position"] - outcome["train.position"])[evaluated].max())
 
 
 def test_the_third_balise_is_refused_by_gate_and_window() -> None:
     outcome = _run(40.0)
-    assert all(judged.passed for judged in outcome.expectations)
+    assert all(evaluated.passed for evaluated in outcome.expectations)
     assert _off(outcome, WINDOW) < 3.0
     assert _off(outcome, FILTER) < 3.0
     assert _off(outcome, SQUARES) > 15.0, "25 m, less what the readings hold against it"

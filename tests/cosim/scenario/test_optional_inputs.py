@@ -13,7 +13,7 @@ NAMES = sorted({*shipped_scenarios()} - {"own_fmu"})  # that one waits for a fil
 READ = ("odometer", "measured_speed", "speed", "generator_speed", "measured_y")
 
 
-def _told(structure: Structure) -> str:
+def _reported(structure: Structure) -> str:
     return "".join(text for text in structure.warnings if text.startswith("Unconnected inputs"))
 
 
@@ -21,9 +21,9 @@ def _told(structure: Structure) -> str:
 def test_a_shipped_scenario_is_warned_of_forgotten_inputs_only(name: str) -> None:
     scenario = Scenario.load(name)
     shown = scenario.structure()
-    assert not _told(shown)
+    assert not _reported(shown)
     read = [link for link in shown.links if link.target[1] in READ]
     assert read
     scenario._data["connections"] = [str(link) for link in shown.links if link not in read]
-    told = _told(scenario.structure())
-    assert [link for link in read if ".".join(link.target) not in told] == []
+    reported = _reported(scenario.structure())
+    assert [link for link in read if ".".join(link.target) not in reported] == []

@@ -63,8 +63,8 @@ EMPTY = "kettle: is empty < at the end; seen at the end, 6 s."
 
 @pytest.mark.parametrize("stop", [0.5, 1.0, 4.0, 6.0])
 def test_a_run_reports_what_was_not_zero(stop: float) -> None:
-    told = _warnings(cosim.Scenario(stop=stop, step=0.5).add("kettle", model=Kettle()))
-    assert told == {0.5: [NOT_READY], 1.0: [], 4.0: [HOT], 6.0: [HOT.replace("1.5 s in", "3.5 s in"), EMPTY]}[stop]
+    reported = _warnings(cosim.Scenario(stop=stop, step=0.5).add("kettle", model=Kettle()))
+    assert reported == {0.5: [NOT_READY], 1.0: [], 4.0: [HOT], 6.0: [HOT.replace("1.5 s in", "3.5 s in"), EMPTY]}[stop]
 
 
 @pytest.mark.compiler
@@ -88,11 +88,11 @@ def test_a_davis_set_beyond_its_speeds_and_a_jam_longer_than_the_run_are_reporte
     s.add("train", model="longitudinal_train", preset="set_d", parameters={"train_speed": 49.0})
     s.add("wheel", model="wheel_fault", parameters={"fault_onset[1]": 2.0, "fault_length[1]": 1.5})
     s.set("train.effort", 1.5).connect("train.speed -> wheel.speed")
-    told = [text for text in s.run().result.summary["warnings"] if "first at" in text or "at the end" in text]
-    assert len(told) == 2
-    assert told[0].startswith("train: the train left the speeds from fitted_from to fitted_to")
-    assert "first at 1 s (speed = 50.3" in told[0]
-    assert told[1].startswith("wheel: a given fault is not over when the run ends")
+    reported = [text for text in s.run().result.summary["warnings"] if "first at" in text or "at the end" in text]
+    assert len(reported) == 2
+    assert reported[0].startswith("train: the train left the speeds from fitted_from to fitted_to")
+    assert "first at 1 s (speed = 50.3" in reported[0]
+    assert reported[1].startswith("wheel: a given fault is not over when the run ends")
     s.set("train.fitted_to", 60.0).set("wheel.fault_length[1]", 0.5)
     assert not any("first at" in t or "at the end" in t for t in s.run().result.summary["warnings"])
 

@@ -124,7 +124,7 @@ def test_an_installed_package_brings_a_cause_and_one_of_a_shipped_name_is_refuse
     target = f"{AdhesionFaults.__module__}:AdhesionFaults"
     brings: list[Any] = [
         SimpleNamespace(name=name, value=target, dist=SimpleNamespace(name="other", version="1.0"))
-        for name in ("theirs", "given")
+        for name in ("theirs", "stated")
     ]
     monkeypatch.setattr(registry, "announced", lambda group: brings if group == FAULT_CAUSES.group else [])
     fresh: Registry[Any] = Registry(FAULT_CAUSES.kind, FAULT_CAUSES.rooms, FAULT_CAUSES.group, FAULT_CAUSES.base)
@@ -132,6 +132,6 @@ def test_an_installed_package_brings_a_cause_and_one_of_a_shipped_name_is_refuse
     scenario = Scenario.load(written / "scenario.toml")
     assert speed(scenario.copy().set("wheel.options", {"cause": "theirs"})) == 20.0
     with pytest.raises(
-        ScenarioError, match=r"fault cause name 'given' is taken twice, by this .* the package other 1.0"
+        ScenarioError, match=r"fault cause name 'stated' is taken twice, by this .* the package other 1.0"
     ):
-        scenario.set("wheel.options", {"cause": "given"}).run()
+        scenario.set("wheel.options", {"cause": "stated"}).run()

@@ -26,15 +26,15 @@ def _study() -> ModuleType:
 
 
 study = _study()
-HELD = [label for label in study.JUDGED if label not in study.EXCEPT]
+HELD = [label for label in study.EVALUATED if label not in study.EXCEPT]
 
 
 def test_every_train_observer_is_evaluated_or_named_with_the_reason() -> None:
     room = {name for name in OBSERVERS if ".observers.train." in type(shipped(name)).__module__}
-    judged = {name for name, _ in study.JUDGED.values()}
-    assert judged | set(study.NOT_HERE) == room  # who adds one adds no line: it stands with its own preset
-    assert not judged & set(study.NOT_HERE)
-    assert set(study.EXCEPT) < set(study.JUDGED)
+    evaluated = {name for name, _ in study.EVALUATED.values()}
+    assert evaluated | set(study.NOT_HERE) == room  # who adds one adds no line: it stands with its own preset
+    assert not evaluated & set(study.NOT_HERE)
+    assert set(study.EXCEPT) < set(study.EVALUATED)
     assert all(study.EXCEPT.values())
     assert len(HELD) >= 8
 

@@ -17,7 +17,7 @@ def test_both_filters_are_consistent_and_equal_at_one_millisecond() -> None:
     scenario = Scenario.load("pendulum_filters")
     outcome = scenario.run(warn=lambda _text: None)
     assert outcome.failure is None
-    assert all(judged.passed for judged in outcome.expectations)
+    assert all(evaluated.passed for evaluated in outcome.expectations)
     found = {(c["observer"], c["quantity"]): c for c in outcome.result.summary["consistency"]}
     assert {found[name, "NIS"]["verdict"] for name in ("ekf", "ukf")} == {"consistent"}
     assert not [w for w in outcome.result.summary["warnings"] if "confident" in w]
@@ -40,15 +40,15 @@ def linear_deviations(plant: HybridSystem, process: float, reading: float, T: fl
     S = C @ P @ C.T + reading * np.eye(n // 2)
     L = P @ C.T @ np.linalg.inv(S)
     # the estimate moves by the innovations, its error is that of the filter, and the two are independent
-    told = scipy.linalg.solve_discrete_lyapunov(closed, L @ S @ L.T) + P - L @ C @ P
-    return np.sqrt([np.diag(known), np.diag(told)])
+    reported = scipy.linalg.solve_discrete_lyapunov(closed, L @ S @ L.T) + P - L @ C @ P
+    return np.sqrt([np.diag(known), np.diag(reported)])
 
 
 def test_a_regulator_fed_by_a_filter_holds_as_linear_theory_says() -> None:
     """Over 19.5 s rms of angle and rates lie within 35 % of theory on each of 12 seeds tried."""
     outcome = Scenario.load("pendulum_lqg").set("stop", 20.0).run(warn=lambda _text: None)
     assert outcome.failure is None
-    assert all(judged.passed for judged in outcome.expectations)
+    assert all(evaluated.passed for evaluated in outcome.expectations)
     cases = (
         (CartPendulum(), 1e-6, 1e-2, ("known", "plant"), {2: "angle", 3: "rate"}),
         (CartDoublePendulum(), 1e-8, 1e-6, ("known_double", "double"), {3: "first_rate", 5: "second_rate"}),

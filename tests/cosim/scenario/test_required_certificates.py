@@ -29,7 +29,7 @@ from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from plant_models.hybrid import HybridSystem, output_signal
 
 CERTIFIED = [name for name, observer in OBSERVERS.items() if hasattr(observer, "sampled_events")]
-TOLD = [name for name in CERTIFIED if shipped(name).triggered_events]
+REPORTED = [name for name in CERTIFIED if shipped(name).triggered_events]
 
 
 @cache
@@ -51,7 +51,7 @@ def everything(name: str) -> tuple[type[HybridSystem], tuple[tuple[str, str], ..
     return Everything, tuple((f"source.out_{s.name}", f"observer.{s.name}") for s in fields)
 
 
-def required(name: str, told: bool = True, **keys: Any) -> Scenario:
+def required(name: str, reported: bool = True, **keys: Any) -> Scenario:
     """An observer of which a certificate is required, and what it may be told of."""
     made, links = everything(name)
     s = Scenario(stop=0.1, step=0.05, certificates="require")  # as long as the gap of the packets: evaluated once
@@ -60,7 +60,7 @@ def required(name: str, told: bool = True, **keys: Any) -> Scenario:
     events = [event.name for event in OBSERVERS[name]().triggered_events]
     for source, target in links:
         signal = target.partition(".")[2]
-        if told or not any(signal.startswith(f"{event}_") for event in events):
+        if reported or not any(signal.startswith(f"{event}_") for event in events):
             s.connect(f"{source} -> {target}")
     return s
 
@@ -69,7 +69,7 @@ def over_a_network(name: str, **keys: Any) -> Scenario:
     owned = [
         source
         for source, target in everything(name)[1]
-        if not target.startswith(("observer.odometer", "observer.measured_")) or name not in TOLD
+        if not target.startswith(("observer.odometer", "observer.measured_")) or name not in REPORTED
     ]
     network: dict[str, Any] = {"nodes": {"all": owned}, "period": 0.1} | keys
     return required(name).network(**network)
@@ -110,8 +110,8 @@ def evaluated_unseen(name: str, _table: Any, _system: Any, gap: ExpectedGap) -> 
 def test_what_is_required_is_asked_for_every_source_or_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(observer_findings, "_evaluated", evaluated_unseen)
     monkeypatch.setattr(observer_findings, "remembered", lambda _kind, _key, make: make())
-    unfed = applied(required(name, told=False))
-    if name not in TOLD:
+    unfed = applied(required(name, reported=False))
+    if name not in REPORTED:
         assert "at this period" in unfed
         return
     assert "nothing triggers its event" in unfed
@@ -121,8 +121,8 @@ def test_what_is_required_is_asked_for_every_source_or_refused(name: str, monkey
 
 @pytest.mark.parametrize("name", CERTIFIED)
 def test_what_is_required_is_applied_to_every_source_or_refused(name: str) -> None:
-    applied(required(name, told=False))
-    if name in TOLD:
+    applied(required(name, reported=False))
+    if name in REPORTED:
         applied(over_a_network(name))
 
 
@@ -304,16 +304,18 @@ def test_what_never_gets_a_sample_is_not_warned_of_sequences_of_gaps() -> None:
     s = Scenario(stop=700.0, step=1.0).add("train", model="locomotive", **{"as": "block3"})
     s.add("obs", observer="discrete_measurement_observer", **{"as": "block3"})
     s.connect("train.wheel_speed -> obs.odometer")
-    (told,) = [text for text in s.run(warn=lambda _: None).warnings if text.startswith("obs: nothing triggers")]
+    (reported,) = [text for text in s.run(warn=lambda _: None).warnings if text.startswith("obs: nothing triggers")]
     begin = "obs: nothing triggers its event 'balise' in this run: it is on its own for all of 700 s, and "
-    assert told.startswith(begin)
-    assert "certified for gaps up to" in told
-    assert "sequences" not in told
+    assert reported.startswith(begin)
+    assert "certified for gaps up to" in reported
+    assert "sequences" not in reported
 
 
 def test_what_has_no_certificate_is_reported_in_words() -> None:
     s = Scenario(stop=1.0, step=0.1).add("train", model="locomotive", **{"as": "block3"})
     s.add("obs", observer="odometer_reset", **{"as": "block3"}).connect("train.wheel_speed -> obs.odometer")
     s.balises(position="train.position", speed="train.speed", layout="instants", instants=[0.5])
-    (told,) = [text for text in s.run(warn=lambda _: None).warnings if "findings" in text]
-    assert told.startswith("obs: not known before the run whether it stays stable over the gaps between its samples")
+    (reported,) = [text for text in s.run(warn=lambda _: None).warnings if "findings" in text]
+    assert reported.startswith(
+        "obs: not known before the run whether it stays stable over the gaps between its samples"
+    )

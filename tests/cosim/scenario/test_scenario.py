@@ -191,9 +191,9 @@ def test_sealed_receivers_treat_late_telegrams_as_blocks_do(backend: str, policy
     assert counts[0][OUTCOME_OF[policy]] > 0
     for name in ("observer.position", "observer.speed"):
         np.testing.assert_allclose(sealed[name], block[name], rtol=1e-12, atol=1e-12)
-    told = small().run(overrides={"stop": 0.8}).result.table
-    same = np.allclose(sealed["observer.position"][-1], told["observer.position"][-1], rtol=1e-9, atol=0.0)
-    assert same == (policy is None)
+    reported = small().run(overrides={"stop": 0.8}).result.table
+    equal = np.allclose(sealed["observer.position"][-1], reported["observer.position"][-1], rtol=1e-9, atol=0.0)
+    assert equal == (policy is None)
 
 
 @pytest.mark.compiler
@@ -227,15 +227,15 @@ def test_an_fmu_that_does_not_say_what_it_does_with_late_telegrams_is_warned_abo
 
 
 def test_doubts_are_reported_before_the_first_step() -> None:
-    told: list[str] = []
+    reported: list[str] = []
 
     def progress(t: float, _stop: float) -> None:
-        told.append(f"reached {t}")
+        reported.append(f"reached {t}")
 
-    outcome = small().set("balises.expected_speed", 1.0).run(progress=progress, warn=told.append)
-    assert "UNSTABLE" in told[0]
-    assert told[1].startswith("reached")
-    assert outcome.warnings == [t for t in told if not t.startswith("reached")]
+    outcome = small().set("balises.expected_speed", 1.0).run(progress=progress, warn=reported.append)
+    assert "UNSTABLE" in reported[0]
+    assert reported[1].startswith("reached")
+    assert outcome.warnings == [t for t in reported if not t.startswith("reached")]
 
 
 def test_a_script_that_asks_for_nothing_finds_the_doubts_in_the_log(caplog: pytest.LogCaptureFixture) -> None:

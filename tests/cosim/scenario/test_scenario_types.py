@@ -58,12 +58,12 @@ def test_a_file_with_everything_in_it(tmp_path: Path) -> None:
     np.testing.assert_array_equal(outcome["one.y_enumeration"], 3.0)
     assert outcome["one.y_boolean"][0] == 0.0
     assert "one.y_matrix[1,3]" not in outcome.result.table.dtype.names
-    given = outcome.result.summary["components"][0]["parameters"]
-    assert given["u_int64"] == 9007199254740993
-    assert (given["u_string"], given["u_binary"], given["u_boolean"]) == ("Grüße", "00ff", True)
+    stated = outcome.result.summary["components"][0]["parameters"]
+    assert stated["u_int64"] == 9007199254740993
+    assert (stated["u_string"], stated["u_binary"], stated["u_boolean"]) == ("Grüße", "00ff", True)
     outcome.write(tmp_path / "out", report=False)
     kept = read_results(tmp_path / "out")
-    assert kept.summary["components"][0]["parameters"] == given
+    assert kept.summary["components"][0]["parameters"] == stated
     np.testing.assert_array_equal(kept.table, outcome.result.table)
 
 

@@ -11,7 +11,7 @@ pytestmark = pytest.mark.compiler
 def test_states_and_rate_are_reported_and_gains_order_the_errors() -> None:
     outcome = Scenario.load("signature_observers").run(warn=lambda _text: None)
     assert outcome.failure is None
-    assert all(judged.passed for judged in outcome.expectations)
+    assert all(evaluated.passed for evaluated in outcome.expectations)
     late = outcome.result.time >= 2.5
     errors = {
         name: float(np.sqrt(np.mean(np.square(outcome[f"{name}.x2"] - outcome["plant.x2"])[late])))

@@ -22,13 +22,13 @@ def test_the_shipped_seed_is_within_the_table_of_twenty_seeds(name: str, monkeyp
 
     outcome = Scenario.load(name).run(warn=lambda _warning: None)
     page = (DOCS / "theses" / "multi_vehicle_train.md").read_text(encoding="utf-8")
-    told = {
+    reported = {
         cells[1].strip(): cells[1 + int(name[-1])].strip()
         for line in page.splitlines()
         if len(cells := line.split("|")) == 7
     }
     for quantity, number in stories.story(outcome).items():
-        cell = told[quantity]
+        cell = reported[quantity]
         if " of " in cell:
             count, seeds = map(int, cell.split(" of "))
             assert number in ({0.0} if count == 0 else {1.0} if count == seeds else {0.0, 1.0}), quantity

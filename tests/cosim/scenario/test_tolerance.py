@@ -22,10 +22,10 @@ def scenario(fmu: Path, **component: Any) -> Scenario:
     return Scenario(stop=0.2, step=0.1).add("plant", fmu=str(fmu), **component)
 
 
-def told(one: Scenario) -> float:
+def reported(one: Scenario) -> float:
     outcome = one.run()
     assert outcome.failure is None
-    value = float(outcome["plant.told"][-1])
+    value = float(outcome["plant.reported"][-1])
     assert (outcome.result.summary["components"][0]["tolerance"] or 0.0) == value
     return value
 
@@ -34,17 +34,17 @@ def told(one: Scenario) -> float:
 def test_the_nearest_tolerance_is_named(tmp_path: Path, version: Any) -> None:
     plain = adaptive_fmu(tmp_path, "plain", version=version)
     declaring = adaptive_fmu(tmp_path, "declaring", version=version, declared=1e-5)
-    assert told(scenario(plain)) == 0.0
-    assert told(scenario(declaring)) == 1e-5
-    assert told(scenario(declaring).set("tolerance", 1e-6)) == 1e-6
-    assert told(scenario(declaring, tolerance=1e-7).set("tolerance", 1e-6)) == 1e-7
-    assert told(scenario(declaring, tolerance="none").set("tolerance", 1e-6)) == 0.0
-    assert told(scenario(declaring).set("tolerance", "none")) == 0.0
+    assert reported(scenario(plain)) == 0.0
+    assert reported(scenario(declaring)) == 1e-5
+    assert reported(scenario(declaring).set("tolerance", 1e-6)) == 1e-6
+    assert reported(scenario(declaring, tolerance=1e-7).set("tolerance", 1e-6)) == 1e-7
+    assert reported(scenario(declaring, tolerance="none").set("tolerance", 1e-6)) == 0.0
+    assert reported(scenario(declaring).set("tolerance", "none")) == 0.0
 
 
 def test_fmi_1_has_no_call_for_it_and_that_is_said(tmp_path: Path) -> None:
     fmu = adaptive_fmu(tmp_path, version=1, declared=1e-5)
-    assert told(scenario(fmu)) == 0.0
+    assert reported(scenario(fmu)) == 0.0
     outcome = scenario(fmu, tolerance=1e-6).run()
     assert any("no call that takes a tolerance; it does nothing for plant" in text for text in outcome.warnings)
 
@@ -60,8 +60,8 @@ def test_an_fmu_that_refuses_the_tolerance_says_so_with_a_hint(tmp_path: Path, v
     assert failure is not None
     with pytest.raises(AssertionError, match=words):
         raise AssertionError(failure)
-    assert told(scenario(fmu, tolerance=1e-3)) == 1e-3
-    assert told(scenario(fmu, tolerance="none")) == 0.0
+    assert reported(scenario(fmu, tolerance=1e-3)) == 1e-3
+    assert reported(scenario(fmu, tolerance="none")) == 0.0
 
 
 @pytest.mark.parametrize("value", [0.0, -1e-6, float("nan"), float("inf"), "fine", True, [1e-6]])
@@ -86,5 +86,5 @@ def test_the_check_names_the_declared_one(tmp_path: Path, version: Any) -> None:
     slave.instantiate()
     slave.enter_initialization(0.0, 1.0)
     slave.exit_initialization()
-    assert slave.read(["told"])[0] == slave.tolerance == load_fmu(fmu, "one").tolerance == 1e-5
+    assert slave.read(["reported"])[0] == slave.tolerance == load_fmu(fmu, "one").tolerance == 1e-5
     slave.free()

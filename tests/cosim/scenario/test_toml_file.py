@@ -46,6 +46,6 @@ def test_a_file_from_windows_is_read(data: bytes, tmp_path: Path) -> None:
 )
 def test_what_cannot_be_read_is_said_with_its_place(data: bytes, message: str, tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_bytes(data)
-    with pytest.raises(ScenarioError, match=r"a\.toml: not readable as TOML") as told:
+    with pytest.raises(ScenarioError, match=r"a\.toml: not readable as TOML") as reported:
         Scenario.load(tmp_path / "a.toml")
-    assert message in str(told.value)
+    assert message in str(reported.value)

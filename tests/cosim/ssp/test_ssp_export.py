@@ -106,8 +106,8 @@ def test_values_that_are_not_real_numbers_survive(tmp_path: Path) -> None:
         scenario.set(f"take.{name}", value)
     not_, table = {"factor": -1.0, "offset": 1.0}, {"values": [[1.0, 7.0], [2.0, 0.0]]}
     ways = {"on": not_, "count": table, "gear": {"factor": -1.0, "offset": 10.0}}
-    given = [{"from": f"send.{v}", "to": f"take.{v}", "units": "ignore", **ways[v]} for v in kinds]
-    scenario._data["connections"] = given
+    stated = [{"from": f"send.{v}", "to": f"take.{v}", "units": "ignore", **ways[v]} for v in kinds]
+    scenario._data["connections"] = stated
     for version in ("1.0", "2.0"):
         path = scenario.export_ssp(tmp_path / "discrete.ssp", version)
         assert_valid(path, version)
@@ -133,9 +133,9 @@ def test_another_fmu_in_the_place_of_a_model_is_used(tmp_path: Path) -> None:
     loaded = Scenario.load(path)
     table = loaded.table().components["odometer"]
     assert (table.model, table.label) == (None, "wheel")
-    told: list[str] = []
-    assert loaded.run(warn=told.append)["odometer.speed"][0] == 10.0
-    assert "is not the FMU that the annotation speaks of" in told[0]
+    reported: list[str] = []
+    assert loaded.run(warn=reported.append)["odometer.speed"][0] == 10.0
+    assert "is not the FMU that the annotation speaks of" in reported[0]
 
 
 def test_one_name_for_two_units_becomes_two(tmp_path: Path) -> None:

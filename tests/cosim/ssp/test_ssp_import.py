@@ -235,12 +235,12 @@ def test_an_array_of_values_for_a_split_vector(load: Load) -> None:
 
 def test_what_is_nothing_of_the_system_is_ignored_and_reported(load: Load) -> None:
     scenario = load(ssd(nested(bindings=bound(real("ramp.x0[3]", "1")))))
-    told: list[str] = []
-    outcome = scenario.run(warn=told.append)
-    assert "parameter 'ramp.x0[3]' is nothing of the root system (did you mean" in told[0]
-    assert told[0].startswith(str(scenario.where))
-    assert ", line " in told[0]
-    assert outcome.warnings == told
+    reported: list[str] = []
+    outcome = scenario.run(warn=reported.append)
+    assert "parameter 'ramp.x0[3]' is nothing of the root system (did you mean" in reported[0]
+    assert reported[0].startswith(str(scenario.where))
+    assert ", line " in reported[0]
+    assert outcome.warnings == reported
 
 
 # -- values that are not real numbers -------------------------------------------------------------------------------
@@ -354,7 +354,7 @@ def test_parameters_of_every_type(tmp_path: Path) -> None:
 
 def test_elements_of_arrays_by_indices(tmp_path: Path) -> None:
     sizes = {"send": ("output", 3), "whole": ("input", 3), "first": ("input", 2)}
-    members = {f"resources/{name}.fmu": array_fmu(tmp_path, name, *given) for name, given in sizes.items()}
+    members = {f"resources/{name}.fmu": array_fmu(tmp_path, name, *stated) for name, stated in sizes.items()}
     parts = {}
     for name, (kind, size) in sizes.items():
         end = f'<ssd:Connector name="x" kind="{kind}"><ssc:Float64/><ssc:Dimension size="{size}"/></ssd:Connector>'

@@ -67,11 +67,11 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
 
 def run(path: Path) -> tuple[np.ndarray, list[str]]:
-    told: list[str] = []
-    outcome = Scenario.load(path).run(warn=told.append)
+    reported: list[str] = []
+    outcome = Scenario.load(path).run(warn=reported.append)
     assert outcome.failure is None
-    assert [w for w in outcome.warnings if w in told] == outcome.warnings
-    return outcome["sum.y"], told
+    assert [w for w in outcome.warnings if w in reported] == outcome.warnings
+    return outcome["sum.y"], reported
 
 
 @pytest.mark.parametrize("case", LAPSES)
@@ -82,10 +82,10 @@ def test_a_lapse_is_reported_and_changes_no_number(
     assert right in GOOD
     good, _ = run(packed(GOOD))
     path = packed(GOOD.replace(right, wrong))
-    found, told = run(path)
+    found, reported = run(path)
     if case != "undeclared prefix":  # whose annotation is another one as well
         np.testing.assert_array_equal(found, good)
-    assert len([line for line in told if words in line]) == 1
+    assert len([line for line in reported if words in line]) == 1
     with pytest.raises(ScenarioError, match="Read strictly; without --strict this is a warning"):
         Scenario.load(path, strict=True)
     assert main(["run", str(path), "--strict", "--quiet", "--no-report", "--out", str(tmp_path / "out")]) == 2
@@ -97,8 +97,8 @@ def test_a_lapse_is_reported_and_changes_no_number(
 def test_a_lapse_at_many_places_is_one_line(packed: Callable[[str], Path]) -> None:
     inputs = GOOD.replace('"input"><ssc:Real unit="m/s"', '"input"><ssc:Real unit=""')
     inputs = inputs.replace("<ssd:Connector name=", "\n<ssd:Connector name=")
-    _, told = run(packed(inputs))
-    (line,) = (text for text in told if "unit ''" in text)
+    _, reported = run(packed(inputs))
+    (line,) = (text for text in reported if "unit ''" in text)
     assert "(and 1 more place): unit ''" in line
 
 
@@ -116,12 +116,12 @@ def test_an_unknown_unit_goes_to_no_other(packed: Callable[[str], Path]) -> None
 
 def test_an_odd_definition_of_a_unit_is_reported(packed: Callable[[str], Path]) -> None:
     litres = '<ssc:Unit name="L/min"><ssc:BaseUnit m="3" s="-1" factor="0.0006"/></ssc:Unit></ssd:Units>'
-    _, told = run(packed(GOOD.replace("</ssd:Units>", litres)))
-    (line,) = (text for text in told if "L/min" in text)
+    _, reported = run(packed(GOOD.replace("</ssd:Units>", litres)))
+    (line,) = (text for text in reported if "L/min" in text)
     assert (
         "is defined as 0.0006 m3.s-1, usually it is 1.66667e-05 m3.s-1; values are converted by the definition" in line
     )
-    assert not any("km/h" in text for text in told)
+    assert not any("km/h" in text for text in reported)
 
 
 @pytest.mark.parametrize(
@@ -154,9 +154,9 @@ def test_the_step_in_an_annotation_is_read(
     table = scenario.table()
     assert table.step == pytest.approx(step, rel=1e-12)
     assert ("communication step of" in str(table.source)) == (words is None)
-    told: list[str] = []
-    scenario.run(warn=told.append)
-    assert any(words in line for line in told) if words else not any("annotation" in line for line in told)
+    reported: list[str] = []
+    scenario.run(warn=reported.append)
+    assert any(words in line for line in reported) if words else not any("annotation" in line for line in reported)
 
 
 def test_internal_variables_of_one_name_are_distinguished(tmp_path: Path) -> None:

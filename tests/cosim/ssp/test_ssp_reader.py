@@ -18,7 +18,7 @@ from cosim.run.outcome import Outcome
 from cosim.ssp.document import NAMESPACES
 
 pytestmark = pytest.mark.compiler
-TOLD = {("balise_reader.balise_" + field, "observer.balise_" + field) for field in ("count", "time", "position")}
+REPORTED = {("balise_reader.balise_" + field, "observer.balise_" + field) for field in ("count", "time", "position")}
 
 
 def run(scenario: Scenario) -> Outcome:
@@ -49,7 +49,9 @@ def test_the_system_finds_its_balises_without_our_master(version: str, tmp_path:
     bare = Scenario.load(without_annotations(path)).set("step", 0.01).master(algorithm="jacobi")
     table = bare.table()
     assert table.balises is None
-    assert {tuple(re.split(" -> ", line)) for line in table.connections if "balise_reader.balise" in str(line)} == TOLD
+    assert {
+        tuple(re.split(" -> ", line)) for line in table.connections if "balise_reader.balise" in str(line)
+    } == REPORTED
     first, second = run(scenario), run(bare)
     assert len(first.result.events) == 3
     assert second["balise_reader.balise_count"][-1] == 3.0

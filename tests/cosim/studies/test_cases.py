@@ -104,7 +104,7 @@ def counted(case: str, **counts: float) -> SweepRun:
 
 def test_shares_and_rates_are_of_all_that_was_counted() -> None:
     """A mean of shares would be 0.5: one of ten and nine of ten are not one of two."""
-    names = ("missed_faults", "faults", "missed_share", "false_alarms", "judged_time", "false_alarms_per_hour")
+    names = ("missed_faults", "faults", "missed_share", "false_alarms", "evaluated_time", "false_alarms_per_hour")
     runs = [
         counted("a", **dict(zip(names, (0.0, 1.0, 0.0, 1.0, 900.0, 4.0), strict=True))),
         counted("a", **dict(zip(names, (9.0, 9.0, 1.0, 0.0, 2700.0, 0.0), strict=True))),

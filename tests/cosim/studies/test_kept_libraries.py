@@ -34,7 +34,7 @@ def short(name: str) -> Scenario:
     return scenario.set("stop", 8.0).set("certificates", "ignore").set("report.phases", [])
 
 
-def assert_same(one: Result, other: Result) -> None:
+def assert_equal(one: Result, other: Result) -> None:
     assert one.failure == other.failure
     np.testing.assert_array_equal(one.table.view(np.uint64), other.table.view(np.uint64))
     assert repr(one.events) == repr(other.events)  # as texts: a reading that is not known is no number
@@ -53,7 +53,7 @@ def test_a_seed_in_a_study_is_the_seed_alone(name: str, monkeypatch: pytest.Monk
     alone = [run.outcome.result for run in scenario.vary(seeds, "zip").each() if run.outcome is not None]
     assert len(together) == len(alone) == 2
     for one, other in zip(together, alone, strict=True):
-        assert_same(one, other)
+        assert_equal(one, other)
     assert len(together[0].table) != len(together[1].table) or not np.array_equal(
         together[0].table.view(np.uint64), together[1].table.view(np.uint64)
     )
@@ -71,7 +71,7 @@ def test_a_library_is_loaded_once_and_makes_way(monkeypatch: pytest.MonkeyPatch)
     scenario.connect("train.wheel_speed -> odometer.wheel_speed").set("train.train_speed", 10.0)
     first, second = (scenario.run().result for _ in range(2))
     assert sorted(loaded) == ["odometer", "train"]
-    assert_same(first, second)
+    assert_equal(first, second)
     kept = list(kept_libraries._kept.values())
     assert [one.used for one in kept] == [0, 0]
     folders = [Path(one.component.slave.unzipDirectory) for one in kept]

@@ -53,8 +53,8 @@ def test_a_batch_serves_again(replay: Replay, run: Outcome) -> None:
 
 
 def test_late_inputs_change_the_errors(replay: Replay, run: Outcome) -> None:
-    told = replay.run(STATES, late={"voltage_d": 1, "voltage_q": 1})[0]
-    assert (told[:, 0] != run["filter.current_d"]).any()
+    reported = replay.run(STATES, late={"voltage_d": 1, "voltage_q": 1})[0]
+    assert (reported[:, 0] != run["filter.current_d"]).any()
     with pytest.raises(ReplayError, match=r"no connected input 'voltage'.*voltage_d"):
         replay.run(STATES, late={"voltage": 1})
 
@@ -76,9 +76,9 @@ def test_costs_of_printed_rows() -> None:
     outcome = drive(1.0).run()
     rows = np.array([ROWS[name] for name in ("hand", "ga_20", "pso_20", "bbo_20", "true_noise")])
     parameters = {"process_variance": rows[:, :4], "measurement_variance": rows[:, 4:]}
-    told = Replay(outcome, "filter").run(STATES, parameters)
+    reported = Replay(outcome, "filter").run(STATES, parameters)
     true = np.stack([outcome[f"motor.{state}"] for state in STATES], axis=1)
-    costs = np.mean((told - true)[:, 1:] ** 2, axis=1).sum(axis=1)
+    costs = np.mean((reported - true)[:, 1:] ** 2, axis=1).sum(axis=1)
     assert (np.diff(costs) < 0.0).all()
     assert costs[-1] == pytest.approx(0.0147, abs=0.002)
     assert costs[:4] == pytest.approx([0.0882, 0.0155, 0.0148, 0.0138], rel=0.2)  # one seed, and two likely misprints
@@ -99,11 +99,11 @@ def test_what_cannot_be_replayed(run: Outcome) -> None:
     changed["filter.speed"][70] += 1e-9
     with pytest.raises(ReplayError, match=r"differs from the run: speed is .* at 0\.007 s"):
         Replay(replace(run, result=replace(run.result, table=changed)), "filter")
-    told = cosim.Scenario(stop=0.1, step=0.1, certificates="ignore").add(
+    reported = cosim.Scenario(stop=0.1, step=0.1, certificates="ignore").add(
         "it", observer="discrete_uio", parameters={"odometer": 0.0}, **{"as": "block3"}
     )
     with pytest.raises(ReplayError, match="receives events"):
-        Replay(told.run(), "it")
+        Replay(reported.run(), "it")
     with pytest.raises(
         ReplayError, match="differs from the run"
     ):  # what it held before the first sample is not recorded

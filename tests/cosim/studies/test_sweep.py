@@ -71,7 +71,7 @@ def test_measures_are_the_errors_of_the_table_and_the_users_own(swept: SweepResu
 def test_results_do_not_depend_on_the_number_of_workers() -> None:
     sweep = plant().vary([{"train.mass": 70e3}, {"stop": 0.1}, {"train.effort": -5e4}])
     done: list[tuple[int, int]] = []
-    here, there = sweep.run(), sweep.run(workers=2, progress=lambda *told: done.append(told))
+    here, there = sweep.run(), sweep.run(workers=2, progress=lambda *reported: done.append(reported))
     for a, b in zip(here.runs, there.runs, strict=True):
         assert a.outcome is not None
         assert b.outcome is not None

@@ -56,18 +56,18 @@ def drive_with_poor_guess(stop: float = 0.01) -> Scenario:
 
 
 def tuned(scenario: Scenario | None = None, **changes: Any) -> Tuning:
-    given: dict[str, Any] = {
+    stated: dict[str, Any] = {
         "observer": "filter",
         "cost": CURRENTS,
         "iterations": 2,
         "options": {"population": 5},
     }
-    return tune(scenario or drive(), changes.pop("parameters", VARIANCES), **{**given, **changes})
+    return tune(scenario or drive(), changes.pop("parameters", VARIANCES), **{**stated, **changes})
 
 
 @pytest.fixture(scope="module")
 def found() -> Tuning:
-    return tuned(drive_with_poor_guess(), seeds=[0, 1], judge=[5])
+    return tuned(drive_with_poor_guess(), seeds=[0, 1], validate=[5])
 
 
 def mean_square(outcome: Outcome) -> float:
@@ -79,13 +79,13 @@ def mean_square(outcome: Outcome) -> float:
 def test_costs_are_those_of_runs_of_the_scenario(found: Tuning) -> None:
     """Members of a batch against whole runs: the same bits, and a cost written by hand to rounding."""
     assert found.how == "as members of a batch over the inputs of the observer"
-    whole = tuned(drive_with_poor_guess(), seeds=[0, 1], judge=[5], whole_runs=True)
+    whole = tuned(drive_with_poor_guess(), seeds=[0, 1], validate=[5], whole_runs=True)
     assert whole.how.startswith("of the whole scenario")
-    assert (found.before, found.after, found.judged_after) == (whole.before, whole.after, whole.judged_after)
+    assert (found.before, found.after, found.validated_after) == (whole.before, whole.after, whole.validated_after)
     assert found.searches == whole.searches
     assert found.before[1] == pytest.approx(mean_square(drive_with_poor_guess().set("seed", 1).run()), rel=1e-12)
     again = found.scenario.copy().set("seed", 5).run()
-    assert found.judged_after[0] == pytest.approx(mean_square(again), rel=1e-12)
+    assert found.validated_after[0] == pytest.approx(mean_square(again), rel=1e-12)
     assert sum(found.after) < sum(found.before)
 
 
@@ -160,14 +160,14 @@ def test_an_interrupted_search_keeps_what_it_found_and_goes_on(tmp_path: Path, f
         if what.startswith("search") and done > 15:
             raise KeyboardInterrupt
 
-    part = tuned(drive_with_poor_guess(), seeds=[0, 1], judge=[5], directory=tmp_path, progress=stop)
+    part = tuned(drive_with_poor_guess(), seeds=[0, 1], validate=[5], directory=tmp_path, progress=stop)
     assert part.interrupted
-    assert part.judged == ()
+    assert part.validated == ()
     lines = [json.loads(line) for line in (tmp_path / "iterations.jsonl").read_text().splitlines()]
     assert [line["iteration"] for line in lines] == [0]
-    whole = tuned(drive_with_poor_guess(), seeds=[0, 1], judge=[5], directory=tmp_path, resume=True)
+    whole = tuned(drive_with_poor_guess(), seeds=[0, 1], validate=[5], directory=tmp_path, resume=True)
     assert whole.searches == found.searches
-    assert whole.judged_after == found.judged_after
+    assert whole.validated_after == found.validated_after
     assert whole.runs < found.runs
     evaluations = [json.loads(line) for line in (tmp_path / JOURNAL).read_text().splitlines()]
     assert len({entry["key"] for entry in evaluations}) == len(evaluations)  # none was done twice
@@ -191,10 +191,10 @@ def test_a_descent_has_exact_gradients_where_the_filter_is_ours() -> None:
     exact = tuned(drive_with_poor_guess(0.004), cost="likelihood", **asked)
     assert exact.how.endswith("exact gradients of the likelihood, by the equations of the filter")
     assert exact.searches[0].evaluations == [1, 2, 3, 4]
-    told = tuned(drive_with_poor_guess(0.004), cost=Twin("filter"), **asked)
-    assert told.how.endswith("gradients by central differences: the cost is not the likelihood")
-    assert told.searches[0].evaluations[0] == 5
-    np.testing.assert_allclose(exact.searches[0].costs, told.searches[0].costs, rtol=1e-3)
+    reported = tuned(drive_with_poor_guess(0.004), cost=Twin("filter"), **asked)
+    assert reported.how.endswith("gradients by central differences: the cost is not the likelihood")
+    assert reported.searches[0].evaluations[0] == 5
+    np.testing.assert_allclose(exact.searches[0].costs, reported.searches[0].costs, rtol=1e-3)
     assert exact.searches[0].costs[-1] < exact.searches[0].costs[0]
 
 
@@ -212,10 +212,10 @@ def test_slopes_are_those_of_differences() -> None:
         return LikelihoodCost("filter").of(found)
 
     moves = 1e-4 * np.eye(2)
-    told = [(cost(at + move) - cost(at - move)) / 2e-4 for move in moves]
-    np.testing.assert_allclose(slopes.of(asked.space, asked.space.named(at)), told, rtol=1e-6)
+    reported = [(cost(at + move) - cost(at - move)) / 2e-4 for move in moves]
+    np.testing.assert_allclose(slopes.of(asked.space, asked.space.named(at)), reported, rtol=1e-6)
     alone = asked.space.without({asked.space.names[0]: 0.3})
-    np.testing.assert_allclose(slopes.of(alone, asked.space.named(at)), told[1:], rtol=1e-6)
+    np.testing.assert_allclose(slopes.of(alone, asked.space.named(at)), reported[1:], rtol=1e-6)
     with pytest.raises(NoSlopesError, match="candidates are not run as members of a batch"):
         LikelihoodSlopes([], asked, LikelihoodCost("filter"))
 
@@ -283,9 +283,9 @@ def test_an_observer_with_balises_runs_beside_recordings() -> None:
     with pytest.raises(ScenarioError, match="has no 'locomotive_mass'"):
         tuned(small(), **asked)
     del asked["parameters"]["locomotive_mass"]
-    beside = tuned(small(), **asked, seeds=[0, 3], judge=[7])
+    beside = tuned(small(), **asked, seeds=[0, 3], validate=[7])
     assert "recorded" in beside.how
-    whole = tuned(small(), **asked, seeds=[0, 3], judge=[7], whole_runs=True)
+    whole = tuned(small(), **asked, seeds=[0, 3], validate=[7], whole_runs=True)
     np.testing.assert_allclose(beside.before, whole.before, rtol=1e-9)
     np.testing.assert_allclose(beside.searches[0].costs, whole.searches[0].costs, rtol=1e-9)
 
@@ -316,7 +316,7 @@ def test_anything_of_a_scenario_is_tuned_by_a_function_of_the_outcome() -> None:
         ({"parameters": {"process_variance[1]": (1.0, float("inf"))}}, "finite bounds"),
         ({"parameters": {"process_variance[1]": (0.0, 1.0, True)}}, "above zero"),
         ({"parameters": {"process_variance[1]": 3.0}}, "expected .low, high."),
-        ({"seeds": [0, 1], "judge": [1, 2]}, "Seeds 1 stand among"),
+        ({"seeds": [0, 1], "validate": [1, 2]}, "Seeds 1 stand among"),
         ({"seeds": []}, "no training seeds"),
         ({"method": "bob"}, "did you mean bbo"),
         ({"options": {"populaton": 3}}, "populaton"),
@@ -336,8 +336,8 @@ def test_what_cannot_be_is_reported_before_a_search(changes: dict[str, Any], wor
 
 def test_values_at_the_end_of_their_range_are_reported() -> None:
     space = SearchSpace([Bounded("q", 1e-6, 1.0, True), Bounded("r", 0.0, 2.0), Bounded("held", 0.0, 1.0)])
-    told = at_bounds(space, {"q": 1e-6, "r": 1.0, "held": 0.0}, {"held": "it changes nothing"})
-    assert [text.partition(":")[0] for text in told] == ["q ends at its lower bound, 1e-06"]
+    reported = at_bounds(space, {"q": 1e-6, "r": 1.0, "held": 0.0}, {"held": "it changes nothing"})
+    assert [text.partition(":")[0] for text in reported] == ["q ends at its lower bound, 1e-06"]
     assert "r ends at its upper bound, 2" in at_bounds(space, {"q": 0.1, "r": 2.0, "held": 0.0}, {"held": ""})[0]
 
 

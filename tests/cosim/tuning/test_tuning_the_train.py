@@ -26,7 +26,7 @@ def test_quick_form_has_the_rows_of_the_page(
     page = study.PAGE.read_text(encoding="utf-8")
     study.main()
     assert study.PAGE.read_text(encoding="utf-8") == page  # what is quick is not written
-    part = re.search(r"<!-- study: judged -->\n(.*?)<!-- end -->", page, re.DOTALL)
+    part = re.search(r"<!-- study: validated -->\n(.*?)<!-- end -->", page, re.DOTALL)
     assert part
     quick, shown = rows(capsys.readouterr().out), rows(part[1])
     assert [row[0] for row in quick] == [row[0] for row in shown]

@@ -22,7 +22,7 @@ typedef struct {
     Model *model;
     size_t states, indicators;
     double t, next_time;
-    int told;
+    int notified;
     double x[MOST], dx[MOST], z[MOST], before[MOST];
 } Run;
 
@@ -31,13 +31,13 @@ static void expect(const char *call, int status) {
         die("%s returned status %d", call, status);
 }
 
-static void update(Run *r, bool tell) {
+static void update(Run *r, bool notify) {
     const Event *e = &r->wiring->event[0];
     const double values[] = {r->t, 10.0 * r->t + 1.0};
     expect("EnterEventMode", r->model->enter_event_mode(r->model));
-    if (tell && r->wiring->events > 0) {
+    if (notify && r->wiring->events > 0) {
         expect("SetReal", r->model->set_reals(r->model, e->to, 2, values));
-        expect("tell", r->model->announce(r->model, r->wiring->slave[0].event_mode ? e->clock : e->count, ++r->told));
+        expect("tell", r->model->announce(r->model, r->wiring->slave[0].event_mode ? e->clock : e->count, ++r->notified));
     }
     expect("update", r->model->update(r->model, &r->next_time));
     expect("EnterContinuousTimeMode", r->model->enter_continuous_time_mode(r->model));
@@ -79,22 +79,22 @@ static void go_on(Run *r, int steps) {
         r->t = end;
         expect("SetTime", r->model->set_time(r->model, end));
         expect("SetContinuousStates", r->model->set_states(r->model, r->x, r->states));
-        bool told = k % 40 == 20, changed = has_changed(r);
-        if (told || changed || end >= r->next_time)
-            update(r, told);
+        bool notified = k % 40 == 20, changed = has_changed(r);
+        if (notified || changed || end >= r->next_time)
+            update(r, notified);
     }
 }
 
 /* By every input, of all that is looked at: what has no derivative is refused. Returns how many were given. */
 static int differentiate(Run *r) {
     const Wiring *w = r->wiring;
-    int given = 0;
+    int stated = 0;
     for (int i = 0; i < w->starts; i++)
         for (int k = 0; k < w->records; k++) {
             double seed = 1.0, sensitivity;
-            given += r->model->directional(r->model, w->record[k].reference, w->start[i].reference, seed, &sensitivity) <= SLAVE_WARNING;
+            stated += r->model->directional(r->model, w->record[k].reference, w->start[i].reference, seed, &sensitivity) <= SLAVE_WARNING;
         }
-    return given;
+    return stated;
 }
 
 /* Whatever the state is, all calls come back. */

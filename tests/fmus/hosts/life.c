@@ -36,11 +36,11 @@ static Slave *start(const Wiring *w) {
     return slave;
 }
 
-static void tell(const Wiring *w, Slave *slave, int count, double stamp, double place) {
+static void notify(const Wiring *w, Slave *slave, int count, double stamp, double place) {
     const Event *e = &w->event[0];
     const double values[] = {stamp, place};
     if (w->slave[0].event_mode) {
-        slave->tell(slave, e->clock, 2, e->to, values);
+        slave->notify(slave, e->clock, 2, e->to, values);
         return;
     }
     slave->set_real(slave, e->to[0], stamp);
@@ -56,7 +56,7 @@ static void run(const Wiring *w, Slave *slave, int first, int last) {
             slave->set_real(slave, w->start[i].reference, w->start[i].value * (1.0 + 0.3 * sin(3.0 * t + i)));
         const double delays[] = {0.4 * STEP, 0.0, -2.5 * STEP};
         if (w->events > 0 && k % 5 == 4)
-            tell(w, slave, k / 5 + 1, t + delays[(k / 5) % 3], 10.0 * t);
+            notify(w, slave, k / 5 + 1, t + delays[(k / 5) % 3], 10.0 * t);
         require(slave, "DoStep", slave->do_step(slave, t, STEP));
     }
 }
@@ -73,7 +73,7 @@ static double checksum(const Wiring *w, Slave *slave) {
     return sum;
 }
 
-static void expect_same(const char *what, double a, double b) {
+static void expect_equal(const char *what, double a, double b) {
     if (memcmp(&a, &b, sizeof a) != 0)
         die("%s: %.17g is not %.17g", what, a, b);
 }
@@ -84,13 +84,13 @@ static void cover_states(const Wiring *w, Slave *slave) {
     double expected = checksum(w, slave);
     slave->restore(slave, state);
     run(w, slave, 40, 60);
-    expect_same("after a restore", checksum(w, slave), expected);
+    expect_equal("after a restore", checksum(w, slave), expected);
     char *bytes;
     size_t size = slave->serialize(slave, state, &bytes);
     void *copy = slave->deserialize(slave, bytes, size);
     slave->restore(slave, copy);
     run(w, slave, 40, 60);
-    expect_same("after a serialised restore", checksum(w, slave), expected);
+    expect_equal("after a serialised restore", checksum(w, slave), expected);
     slave->forget(slave, copy);
     slave->forget(slave, state);
     free(bytes);
@@ -113,7 +113,7 @@ static void cover(const Wiring *w) {
         slave->set_real(slave, w->start[i].reference, w->start[i].value);
     slave->exit_initialization(slave);
     run(w, slave, 0, 60);
-    expect_same("after a reset", checksum(w, slave), expected);
+    expect_equal("after a reset", checksum(w, slave), expected);
     slave->close(slave);
     other->close(other); /* without terminate */
 }
@@ -123,7 +123,7 @@ static void damage(const Wiring *w) {
     Slave *slave = start(w);
     run(w, slave, 0, 24);
     if (w->events > 0)
-        tell(w, slave, 5, 24.4 * STEP, 2.0);
+        notify(w, slave, 5, 24.4 * STEP, 2.0);
     void *state = slave->save(slave);
     char *bytes;
     size_t size = slave->serialize(slave, state, &bytes);
@@ -140,7 +140,7 @@ static void damage(const Wiring *w) {
     }
     require(slave, "restore", slave->try_restore(slave, bytes, size));
     require(slave, "DoStep", slave->do_step(slave, 24 * STEP, STEP));
-    expect_same("after damaged states", checksum(w, slave), expected);
+    expect_equal("after damaged states", checksum(w, slave), expected);
     printf("%d %d\n", tried, accepted);
     free(bytes);
     slave->close(slave);

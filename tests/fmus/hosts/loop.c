@@ -13,7 +13,7 @@ typedef struct {
     Wiring wiring;
     const char *output;
     Slave *slave[MOST];
-    int told[MOST]; /* by event: the count that was told last */
+    int notified[MOST]; /* by event: the count that was told last */
 } Simulation;
 
 static void transfer(Simulation *s, int target) {
@@ -29,20 +29,20 @@ static void transfer(Simulation *s, int target) {
     }
 }
 
-static void tell_events(Simulation *s, int target) {
+static void notify_events(Simulation *s, int target) {
     for (int i = 0; i < s->wiring.events; i++) {
         const Event *e = &s->wiring.event[i];
         if (e->target != target)
             continue;
         Slave *source = s->slave[e->source], *sink = s->slave[target];
         int count = source->get_integer(source, e->count);
-        if (count == s->told[i])
+        if (count == s->notified[i])
             continue;
         double values[MOST_PAYLOADS];
         for (size_t k = 0; k < e->payloads; k++)
             values[k] = source->get_real(source, e->from[k]);
-        sink->tell(sink, e->clock, e->payloads, e->to, values);
-        s->told[i] = count;
+        sink->notify(sink, e->clock, e->payloads, e->to, values);
+        s->notified[i] = count;
     }
 }
 
@@ -96,7 +96,7 @@ static void *run(void *argument) {
         double t = w->start_time + k * w->step; /* time is an index; adding up would drift */
         for (int i = 0; i < w->slaves; i++) {
             transfer(s, i);
-            tell_events(s, i);
+            notify_events(s, i);
             require(s->slave[i], "DoStep", s->slave[i]->do_step(s->slave[i], t, w->step));
         }
         write_row(s, csv, w->start_time + (k + 1) * w->step);

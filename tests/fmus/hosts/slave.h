@@ -21,7 +21,7 @@ struct Slave {
     int (*get_integer)(Slave *slave, unsigned reference);
     void (*set_integer)(Slave *slave, unsigned reference, int value);
     int (*do_step)(Slave *slave, double t, double h);
-    void (*tell)(Slave *slave, unsigned clock, size_t count, const unsigned *references, const double *values); /* FMI 3 */
+    void (*notify)(Slave *slave, unsigned clock, size_t count, const unsigned *references, const double *values); /* FMI 3 */
     void *(*save)(Slave *slave);
     void (*restore)(Slave *slave, void *state);
     void (*forget)(Slave *slave, void *state);

@@ -69,7 +69,7 @@ static int do_step(Slave *slave, double t, double h) {
     return status == fmi3OK && early ? SLAVE_ERROR : (int)status; /* early return was not allowed */
 }
 
-static void tell(Slave *slave, unsigned clock, size_t count, const unsigned *references, const double *values) {
+static void notify(Slave *slave, unsigned clock, size_t count, const unsigned *references, const double *values) {
     Slave3 *s = (Slave3 *)slave;
     const fmi3Clock active = fmi3ClockActive;
     require(slave, "fmi3EnterEventMode", s->EnterEventMode(s->c));
@@ -135,7 +135,7 @@ static void close_slave(Slave *slave) {
 Slave *open_fmi3(const char *name, const char *library, const char *token, const char *resources, bool event_mode) {
     Slave3 *s = calloc(1, sizeof *s);
     s->slave = (Slave){name, enter_initialization, exit_initialization, get_real, set_real, get_integer, set_integer, do_step,
-                       tell, save,                 restore,             forget,   serialize, deserialize, reset,      terminate,
+                       notify, save,                 restore,             forget,   serialize, deserialize, reset,      terminate,
                        try_restore, close_slave};
     s->event_mode = event_mode;
     void *handle = load_library(library);

@@ -7,7 +7,7 @@
 #include "test_fmus.h"
 
 typedef struct {
-    double time, tolerance, told, p, v;
+    double time, tolerance, reported, p, v;
 } Model;
 
 typedef struct {
@@ -27,7 +27,7 @@ static void model_start(Model *m) {
 static void model_begin(Model *m, double t0) { m->time = t0; }
 
 static Slot model_slot(Model *m, unsigned reference) {
-    double *const places[] = {&m->time, &m->p, &m->v, &m->told};
+    double *const places[] = {&m->time, &m->p, &m->v, &m->reported};
     if (reference > TOLD)
         return (Slot){0};
     return (Slot){.kind = F64, .role = OUTPUT, .at = places[reference], .size = 1};
@@ -37,7 +37,7 @@ static void model_refresh(Model *m) { (void)m; }
 
 #if TAKES_TOLERANCE
 static bool model_tolerance(Model *m, double tolerance) {
-    m->told = tolerance;
+    m->reported = tolerance;
     if (tolerance > 0.0)
         m->tolerance = tolerance;
     return tolerance == 0.0 || tolerance >= FINEST;

@@ -43,7 +43,7 @@ static Outcome model_step(Model *m, Host *host, double t, double until) {
     return outcome;
 }
 
-static void answer(Model *m, double y) {
+static void respond(Model *m, double y) {
     m->changes += y != m->y;
     m->y = y;
 }
@@ -53,11 +53,11 @@ static Update model_update(Model *m, const Host *host, double t) {
     if (m->u != m->seen) {
         m->seen = m->u;
         if (m->u < m->limit)
-            answer(m, m->u + m->add);
+            respond(m, m->u + m->add);
     }
     if (to_be_kicked(m) && m->kick_time <= t + SAME) {
         m->kicked = true;
-        answer(m, 1.0);
+        respond(m, 1.0);
     }
     return (Update){.has_next = to_be_kicked(m), .next = to_be_kicked(m) ? m->kick_time : 0.0};
 }

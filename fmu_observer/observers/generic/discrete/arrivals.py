@@ -84,7 +84,7 @@ class Arrivals:
             event: its name.
         """
         name = PERIODIC if event == SAMPLING else event
-        return tuple(i for i, given in enumerate(self.names) if given == name)
+        return tuple(i for i, stated in enumerate(self.names) if stated == name)
 
     def measured(self, event: str, u: Any) -> Array:
         """The measurements that arrive at an event, shape (len(rows),).

@@ -142,9 +142,9 @@ class MovingHorizonObserver(ExtendedKalmanFilter):
         self.window, self.passes, self.bounds, self._loss = window, passes, _bounds(self.name, bounds), loss
         self.noise_bounds = _bounds(self.name, noise_bounds, "noise_bounds")
         both = {"bounds": self.bounds, "noise_bounds": self.noise_bounds}
-        given = {key: {name: list(pair) for name, pair in of.items()} for key, of in both.items() if of}
+        stated = {key: {name: list(pair) for name, pair in of.items()} for key, of in both.items() if of}
         listed = loss if isinstance(loss, str) else list(loss)
-        super().__init__(model, window=window, passes=passes, loss=listed, **given, **options)
+        super().__init__(model, window=window, passes=passes, loss=listed, **stated, **options)
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The window with a row more, and the estimates that it gives."""
@@ -320,25 +320,25 @@ def _starts(bounds: Bounds) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return lower, upper
 
 
-def _bounds(who: str, given: Bounds | None, option: str = "bounds") -> dict[str, Sequence[float | None]]:
+def _bounds(who: str, stated: Bounds | None, option: str = "bounds") -> dict[str, Sequence[float | None]]:
     """Bounds by name of a state, each a pair of numbers or None, the lowest below the highest."""
-    if given is not None and not isinstance(given, Mapping):
+    if stated is not None and not isinstance(stated, Mapping):
         raise ValueError(
-            f"{who}: {option} = {given!r}; expected [lowest, highest] by name of a state, as in {{'x2': [0.0, 1.0]}}."
+            f"{who}: {option} = {stated!r}; expected [lowest, highest] by name of a state, as in {{'x2': [0.0, 1.0]}}."
         )
-    for name, pair in (given or {}).items():
+    for name, pair in (stated or {}).items():
         legal = isinstance(pair, list | tuple) and len(pair) == 2
         if not legal or not all(bound is None or is_number(bound) for bound in pair):
             raise ValueError(f"{who}: {option} of {name!r} are {pair!r}; expected [lowest, highest], both numbers.")
         low, high = pair
         if low is not None and high is not None and not low < high:
             raise ValueError(f"{who}: {option} of {name!r} are {pair!r}; the lowest must be below the highest.")
-    return dict(given or {})
+    return dict(stated or {})
 
 
 def _losses(who: str, loss: Loss | Sequence[Loss], count: int) -> tuple[Loss, ...]:
     losses = (loss,) * count if isinstance(loss, str) else tuple(loss)
-    wrong = [given for given in losses if given not in LOSSES]
+    wrong = [stated for stated in losses if stated not in LOSSES]
     if wrong or len(losses) != count:
         raise ValueError(
             f"{who}: loss = {loss!r}; expected one of {', '.join(LOSSES)}, or a list of them with one for each of the "

@@ -92,7 +92,7 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified):
             raise ValueError(f"{self.name}: gains must be TakagiSugenoGains(eta, sampled, continuous), got {gains!r}.")
         self.premise = premise
         require_detectable_vertices(chosen, self.name)
-        shipped = GAINS.get(chosen.name, {}) if gains is None else {"given": gains}
+        shipped = GAINS.get(chosen.name, {}) if gains is None else {"stated": gains}
         if not shipped:
             raise ValueError(
                 f"{self.name}: no gains are shipped for model {chosen.name!r}; give gains=, e.g. by design_theorem7."

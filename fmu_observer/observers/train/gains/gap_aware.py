@@ -266,9 +266,9 @@ def _design(
     found = next(observer.findings(gaps.longest, parameters))
     if not found.holds:
         raise ValueError(f"{observer.name}: the gains of the design are not certified. {found.explain()}")
-    judged = [(error(gap), gap) for gap in map(float, np.linspace(gaps.shortest, gaps.longest, 5))]
+    evaluated = [(error(gap), gap) for gap in map(float, np.linspace(gaps.shortest, gaps.longest, 5))]
     margin = found.limit / gaps.longest - 1.0
-    return GainDesign(observer.name, parameters, gaps, found, margin, _noise_amplification(judged, odometer_gain))
+    return GainDesign(observer.name, parameters, gaps, found, margin, _noise_amplification(evaluated, odometer_gain))
 
 
 def _with_margin(gaps: _BaliseGaps, margin: float) -> float:

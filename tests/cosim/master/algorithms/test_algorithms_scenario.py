@@ -27,15 +27,15 @@ def test_the_summary_says_what_was_chosen_and_why(tmp_path: Path) -> None:
     outcome = scenario(DIVERGENT.parts, DIVERGENT.connections, tmp_path).run()
     assert outcome.failure is None
     np.testing.assert_allclose(outcome["first.y"], DIVERGENT.solution[0], rtol=1e-10)
-    told = outcome.result.summary["master"]["algorithm"]
-    assert told["name"] == "iterate"
-    assert told["reason"] == (
+    reported = outcome.result.summary["master"]["algorithm"]
+    assert reported["name"] == "iterate"
+    assert reported["reason"] == (
         "There is an algebraic loop, first.u -> first.y -> second.u -> second.y -> first.u; the rest is stepped by "
         "Gauss-Seidel."
     )
-    assert told["groups"] == [["first", "second"]]
-    assert told["loops"][0]["iterated"] == ["second.y"]
-    assert set(told["loops"][0]) >= {
+    assert reported["groups"] == [["first", "second"]]
+    assert reported["loops"][0]["iterated"] == ["second.y"]
+    assert set(reported["loops"][0]) >= {
         "mean_iterations",
         "max_iterations",
         "largest_residual",
@@ -49,13 +49,15 @@ def test_the_summary_says_what_was_chosen_and_why(tmp_path: Path) -> None:
 def test_held_connections_are_reported(tmp_path: Path) -> None:
     cut = cuts(Chain.two())["force-displacement"]
     made = scenario(dict(cut.parts), cut.connections, tmp_path)
-    told = {}
+    reported = {}
     for algorithm in ("auto", "jacobi", "iterate"):
-        told[algorithm] = made.copy().master(algorithm=algorithm, threads=2).run().result.summary["master"]["algorithm"]
-    assert told["auto"]["name"] == "gauss-seidel"
-    assert told["auto"]["held"] == ["mass2.f_left -> mass1.f_right"]
-    assert sorted(told["jacobi"]["held"]) == sorted(cut.connections)
-    assert told["iterate"]["held"] == []
+        reported[algorithm] = (
+            made.copy().master(algorithm=algorithm, threads=2).run().result.summary["master"]["algorithm"]
+        )
+    assert reported["auto"]["name"] == "gauss-seidel"
+    assert reported["auto"]["held"] == ["mass2.f_left -> mass1.f_right"]
+    assert sorted(reported["jacobi"]["held"]) == sorted(cut.connections)
+    assert reported["iterate"]["held"] == []
 
 
 @pytest.mark.compiler

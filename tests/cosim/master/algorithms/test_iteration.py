@@ -326,19 +326,21 @@ def test_balises_inside_an_iterated_loop_are_delivered_once_and_leave_no_trace(m
         close(master.plan)
         return ran(master)
 
-    plain, told = result(None), result(BaliseSide(positions(*places), method=method, receivers=["listener"]))
-    points = np.isin(told.time, plain.time)
+    plain, reported = result(None), result(BaliseSide(positions(*places), method=method, receivers=["listener"]))
+    points = np.isin(reported.time, plain.time)
     assert points.sum() == len(plain.time)
     for name in ("plant.position", "plant.speed", "listener.push"):
-        assert told[name][points].tobytes() == plain[name].tobytes()
+        assert reported[name][points].tobytes() == plain[name].tobytes()
     if layout == "receiver in the loop":
         # v+ = v - 0.1 * 0.3 v+
         np.testing.assert_allclose(plain["plant.speed"], 10.0 / 1.03 ** np.arange(11), rtol=1e-8)
-    assert [event.position for event in told.events] == list(places)
-    assert told["listener.heard"][-1] == len(places)
+    assert [event.position for event in reported.events] == list(places)
+    assert reported["listener.heard"][-1] == len(places)
     if method == "rollback":
-        np.testing.assert_allclose(told.after("plant.position"), places, rtol=0.0, atol=1e-8)
-        np.testing.assert_allclose(told.after("listener.at"), [e.stamp for e in told.events], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(reported.after("plant.position"), places, rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(
+            reported.after("listener.at"), [e.stamp for e in reported.events], rtol=0.0, atol=1e-12
+        )
 
 
 # -- what the summary tells

@@ -323,8 +323,8 @@ def test_a_scenario_connects_clocks_and_may_leave_events_local(folder: Path) -> 
     together, alone = outcome(), outcome(events="local")
     assert together.failure is None
     assert together["r.integral"][-1] == pytest.approx(received_integral(1.0), abs=ULPS)
-    told = together.result.summary["master"]["events"]
-    assert (told["participants"], told["instants"], told["redone"]) == (["s", "r"], 5, 5)
+    reported = together.result.summary["master"]["events"]
+    assert (reported["participants"], reported["instants"], reported["redone"]) == (["s", "r"], 5, 5)
     assert alone.failure is None
     assert alone["r.count"][-1] == 0.0
     assert alone.result.summary["master"]["events"] is None

@@ -168,7 +168,7 @@ def test_a_redone_step_leaves_no_trace(folder: Path) -> None:
     """
     level = 0.173
     instants = tuple(level * k for k in range(1, 6))
-    told = timed_fmu(folder, "told", instants=instants, levels=(1.0, 2.0, 3.0, 4.0, 5.0), first=0.0)
+    reported = timed_fmu(folder, "reported", instants=instants, levels=(1.0, 2.0, 3.0, 4.0, 5.0), first=0.0)
 
     def bystanders() -> list[Component]:
         return [
@@ -179,7 +179,7 @@ def test_a_redone_step_leaves_no_trace(folder: Path) -> None:
 
     wires = ["s.{} -> i.u", "plant.speed -> listener.speed"]
     unknown = run([*bystanders(), *parts(s=triggered_fmu(folder))], [w.format("count") for w in wires], 0.1, 10)
-    known = run([*bystanders(), *parts(s=told)], [w.format("level") for w in wires], 0.1, 10)
+    known = run([*bystanders(), *parts(s=reported)], [w.format("level") for w in wires], 0.1, 10)
     assert unknown.master.system.events is not None
     assert unknown.master.system.events.redone == 5
     assert known.master.system.events is not None

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.evaluation.metrics import FEWEST_INSTANTS
 from cosim.evaluation.spec import ReportSpec
-from cosim.expectations.judged import given
+from cosim.expectations.evaluated import written
 from cosim.results.result import Result
 
 _ROUNDING = 1e-9  # relative; times closer than this are the same
@@ -47,7 +47,7 @@ class TimeWindow:
     @property
     def unreached(self) -> str:
         """What to say where the run did not get to its end."""
-        return f"not reached: the run ended at {given(self.reached)} s, before {given(self.end)} s"
+        return f"not reached: the run ended at {written(self.reached)} s, before {written(self.end)} s"
 
     def holds(self, instant: float) -> bool:
         """Whether an instant lies in it."""
@@ -70,7 +70,7 @@ def _window_of(result: Result, start: float | None, end: float | None, first: fl
 
 
 @dataclass(frozen=True)
-class JudgedRun:
+class EvaluatedRun:
     """A run to be judged.
 
     Args:
@@ -112,6 +112,6 @@ def span(start: float | None, end: float | None) -> str:
         start: of the window [s]; None for the begin of the run.
         end: of the window [s]; None for the end of the run.
     """
-    begin = f" from {given(start)}" if start is not None else ""
-    until = f" to {given(end)}" if end is not None else ""
+    begin = f" from {written(start)}" if start is not None else ""
+    until = f" to {written(end)}" if end is not None else ""
     return f",{begin}{until} s" if begin or until else ""

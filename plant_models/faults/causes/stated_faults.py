@@ -12,7 +12,7 @@ from plant_models.hybrid import Array, vector
 from plant_models.hybrid.signal import parameter, state
 
 
-class GivenFaults(TimedFaults):
+class StatedFaults(TimedFaults):
     """Faults in the order of time, fault i in ``[fault_onset[i], fault_onset[i] + fault_length[i])``.
 
     A jam ends earlier where the brake was released for `release_time` in it.
@@ -21,7 +21,7 @@ class GivenFaults(TimedFaults):
         carrier: what the cause acts on.
     """
 
-    name = "given"
+    name = "stated"
     description = "Jams and skids by onset, length, depth and kind"
     ranges = (("fault_depth", 0.05, 1.0),)
     EDGES = ("from", "to", "freed")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from cosim.expectations.judged import Judged
-from cosim.expectations.judged_run import JudgedRun, NotRecordedError
+from cosim.expectations.evaluated import Evaluated
+from cosim.expectations.evaluated_run import EvaluatedRun, NotRecordedError
 from plant_models.explained_error import explained
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cosim.scenario.schema import ScenarioTable
 
 
-def judge(table: ScenarioTable, outcome: Outcome) -> list[Judged]:
+def evaluate(table: ScenarioTable, outcome: Outcome) -> list[Evaluated]:
     """Hold a run against the expectations of its scenario.
 
     Args:
@@ -23,20 +23,20 @@ def judge(table: ScenarioTable, outcome: Outcome) -> list[Judged]:
     Returns:
         What became of each expectation, in order; one that limits several things gives several entries.
     """
-    run = JudgedRun(outcome.result, outcome.spec, table.start, table.stop)
-    return [judged for place, item in enumerate(table.expect, start=1) for judged in _judge(place, item, run)]
+    run = EvaluatedRun(outcome.result, outcome.spec, table.start, table.stop)
+    return [evaluated for place, item in enumerate(table.expect, start=1) for evaluated in _evaluate(place, item, run)]
 
 
-def _judge(place: int, item: Any, run: JudgedRun) -> list[Judged]:
+def _evaluate(place: int, item: Any, run: EvaluatedRun) -> list[Evaluated]:
     try:
-        parts = item.judge(run)
+        parts = item.evaluate(run)
     except NotRecordedError as error:
-        parts = [Judged(item.check, item.check, passed=False, text=str(error))]
+        parts = [Evaluated(item.check, item.check, passed=False, text=str(error))]
     except Exception as error:  # code of others
-        parts = [Judged(item.check, item.check, passed=False, text=f"judge() failed: {explained(error)}")]
-    if not isinstance(parts, list) or not all(isinstance(part, Judged) for part in parts):
+        parts = [Evaluated(item.check, item.check, passed=False, text=f"judge() failed: {explained(error)}")]
+    if not isinstance(parts, list) or not all(isinstance(part, Evaluated) for part in parts):
         text = f"judge() returned {type(parts).__name__}; expected a list of Judged"
-        parts = [Judged(item.check, item.check, passed=False, text=text)]
+        parts = [Evaluated(item.check, item.check, passed=False, text=text)]
     if item.name is not None:
         parts = [replace(j, name=item.name if len(parts) == 1 else f"{item.name} ({j.name})") for j in parts]
     return [replace(j, number=place) for j in parts]

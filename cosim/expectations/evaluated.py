@@ -12,7 +12,7 @@ from fmus.tables.table import Table, name_column, text_column
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class Evaluated:
     """One thing that was expected, and what was measured.
 
     Args:
@@ -41,7 +41,7 @@ class Judged:
         return asdict(self)
 
     @classmethod
-    def from_data(cls, data: Mapping[str, Any]) -> Judged:
+    def from_data(cls, data: Mapping[str, Any]) -> Evaluated:
         """From the summary of a run, also from a file, where NaN has become None.
 
         Args:
@@ -58,16 +58,16 @@ _COLUMNS = (
 )
 
 
-def judged_table(judged: Sequence[Judged]) -> Table:
+def evaluated_table(evaluated: Sequence[Evaluated]) -> Table:
     """All expectations with what was measured, what is not met first.
 
     Args:
-        judged: of the run.
+        evaluated: of the run.
     """
-    unmet = [j for j in judged if not j.passed]
-    everything = "The expectation is met:" if len(judged) == 1 else f"All {len(judged)} expectations met:"
-    head = f"{len(unmet)} of {len(judged)} expectations not met:" if unmet else everything
-    rows = [["met" if j.passed else "not met", j.name, j.text] for j in sorted(judged, key=lambda j: j.passed)]
+    unmet = [j for j in evaluated if not j.passed]
+    everything = "The expectation is met:" if len(evaluated) == 1 else f"All {len(evaluated)} expectations met:"
+    head = f"{len(unmet)} of {len(evaluated)} expectations not met:" if unmet else everything
+    rows = [["met" if j.passed else "not met", j.name, j.text] for j in sorted(evaluated, key=lambda j: j.passed)]
     return Table("expectations", _COLUMNS, rows, head)
 
 
@@ -80,7 +80,7 @@ def with_unit(value: float, unit: str, digits: int = 4) -> str:
     return _unit_behind(number(value, digits), unit)
 
 
-def given(value: float, unit: str = "") -> str:
+def written(value: float, unit: str = "") -> str:
     """A number as it was given, a limit or an instant, with its unit.
 
     Args:
@@ -95,7 +95,7 @@ def at(when: float, what: str = "at") -> str:
     Args:
         when: instant [s]. what: that happened then.
     """
-    return f" ({what} {given(when)} s)" if isfinite(when) else ""
+    return f" ({what} {written(when)} s)" if isfinite(when) else ""
 
 
 def _unit_behind(text: str, unit: str) -> str:
