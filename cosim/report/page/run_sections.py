@@ -40,7 +40,7 @@ def run_sections(result: Result, spec: ReportSpec, evaluated: Sequence[Evaluated
     """All sections of the page of a run; those without content leave nothing behind.
 
     Args:
-        result: the run. spec: roles, labels, phases. judged: expectations.
+        result: the run. spec: roles, labels, phases. evaluated: expectations.
     """
     tables = run_tables(result, spec, evaluated)
     seeds = len(mapping_entry(result, "seed_study").get("seeds", []))

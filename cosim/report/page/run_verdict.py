@@ -91,7 +91,7 @@ def run_verdict(
     """What a run comes to, in a sentence or two.
 
     Args:
-        result: the run. spec: roles. judged: expectations. statuses: from `observer_statuses`.
+        result: the run. spec: roles. evaluated: expectations. statuses: from `observer_statuses`.
     """
     reached = number(float(result.time[-1])) if len(result.time) else "0"
     if result.failure is not None:

@@ -204,7 +204,7 @@ def test_the_command_ends_with_1_where_something_is_unmet(
         code == 1
     )
     page = (tmp_path / "out" / "report.html").read_text()
-    assert ("expectations not met" in page) is (code == 1)
+    assert ("expectations are not met" in page) is (code == 1)
     assert "train.speed, max" in page
 
 
