@@ -121,3 +121,10 @@ def test_links_and_pictures_exist(page: Path) -> None:
     written = f"{shlex.split(command('run'))[-1]}/report.html"  # by the run of the README
     there = {t for t in targets if (page.parent / t).exists() or (page.parent / f"{t}.md").exists() or t == written}
     assert sorted(set(targets) - there) == []
+
+
+def test_the_index_links_every_page() -> None:
+    index = ROOT / "docs" / "index.md"
+    linked = {index.parent / target for target in re.findall(r"\]\(([^)#]+\.md)\)", index.read_text(encoding="utf-8"))}
+    sheets = {page for page in PAGES if page.name.startswith("gallery_")}  # linked by the index of the theses
+    assert sorted(set(PAGES) - sheets - linked - {README, index}) == []
