@@ -6,17 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-    vector,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, TriggeredEvent, vector
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, state
 
 
 class Hyperbola(HybridSystem):

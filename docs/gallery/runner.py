@@ -13,17 +13,8 @@ import numpy as np
 
 from fmu_observer.models.observer_model import ObserverModel, named_as, stacked_of
 from fmu_observer.observers.parameter_values import parameter_values
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    Runtime,
-    TriggeredEvent,
-    input_signal,
-    output_signal,
-    parameter,
-    scalar_names,
-    vector,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, Runtime, TriggeredEvent, vector
+from plant_models.hybrid.signal import input_signal, output_signal, parameter, scalar_names
 
 Seen = Callable[[Mapping[str, Any], Any], Mapping[str, Any]]
 

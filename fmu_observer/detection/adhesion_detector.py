@@ -11,18 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from fmu_observer.detection.slip_indicator import DEGRADED, NOMINAL, speed_slip_from_odometer_slip
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
 from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, output_signal, parameter, state
 from plant_models.railway.adhesion.law import POLACH_DRY, POLACH_WET, PolachCurve
 from plant_models.railway.track.track import piecewise_linear
 

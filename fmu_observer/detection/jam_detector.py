@@ -19,18 +19,10 @@ from fmu_observer.detection.jam_rules import (
     certain_fault,
     doubt_limit,
 )
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
 from plant_models.hybrid.arrays import indicator
 from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.signal import Signal, discrete_output, input_signal, memory, parameter
 
 
 class _PrintedRules(Rules):

@@ -10,18 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
+from plant_models.hybrid.signal import Signal, discrete_output, input_signal, memory, output_signal, parameter, state
 
 NOMINAL, DEGRADED = 1.0, 2.0
 

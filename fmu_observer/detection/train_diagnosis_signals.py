@@ -4,16 +4,8 @@ from __future__ import annotations
 
 from fmu_observer.detection.train_isolation import FAULTS, RESIDUALS
 from fmu_observer.detection.train_residuals import ABSENT
-from plant_models.hybrid import (
-    PeriodicEvent,
-    Signal,
-    TriggeredEvent,
-    discrete_output,
-    input_signal,
-    output_signal,
-    parameter,
-    warning_output,
-)
+from plant_models.hybrid import PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.signal import Signal, discrete_output, input_signal, output_signal, parameter, warning_output
 from plant_models.railway.vehicle.pneumatic_brake import BRAKE_PARAMETERS
 
 _FIT = "-1e9: not fitted"

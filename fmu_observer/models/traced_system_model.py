@@ -25,21 +25,12 @@ from fmu_observer.models.filter_models import FilterModel, Known, Measured, Tran
 from fmu_observer.models.known_models import MODELS, find_model
 from fmu_observer.models.observer_model import ObserverModel
 from plant_models import PLANTS
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    Signal,
-    TracedSystem,
-    input_signal,
-    scalar_names,
-    state,
-    vector,
-    width,
-)
+from plant_models.hybrid import Array, HybridSystem, TracedSystem, vector
 from plant_models.hybrid.exact_jacobian import is_affine
 from plant_models.hybrid.integration import step
 from plant_models.hybrid.option import is_number, require_whole
 from plant_models.hybrid.scan import Arrays, enclosed, scan_table
+from plant_models.hybrid.signal import Signal, input_signal, scalar_names, state, width
 from plant_models.interop.continuous_part import known as known_name
 from plant_models.user_file import Expected, load_class, names_code
 

@@ -9,17 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from plant_models.hybrid import (
-    PeriodicEvent,
-    Signal,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
-from plant_models.hybrid.signal import Variability
+from plant_models.hybrid import PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.signal import Signal, Variability, input_signal, memory, output_signal, parameter, state
 
 LAST_NIS = memory("last_nis", "1", 0.0, "Last normalised innovation squared")
 LOG_LIKELIHOOD = memory("log_likelihood", "1", 0.0, "Logarithm of the likelihood of all innovations so far")

@@ -7,17 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
 from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.signal import Signal, discrete_output, input_signal, memory, parameter
 
 
 @dataclass(frozen=True)

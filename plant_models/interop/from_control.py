@@ -9,24 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    TracedSystem,
-    TracingError,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-    vector,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, TracedSystem, TracingError, vector
 from plant_models.hybrid.arrays import of_length
 from plant_models.hybrid.declaration_checks import RESERVED_NAMES
 from plant_models.hybrid.declarations import Method
-from plant_models.hybrid.signal import Variability
+from plant_models.hybrid.signal import Signal, Variability, input_signal, memory, output_signal, parameter, state
 from plant_models.interop.continuous_part import Values, filled, known
 
 if TYPE_CHECKING:

@@ -25,15 +25,8 @@ from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
 from cosim.results.result import BaliseRecord
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
-from plant_models.hybrid import (
-    HybridSystem,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import HybridSystem, TriggeredEvent
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, state
 
 
 class Motion(HybridSystem):

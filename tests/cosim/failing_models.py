@@ -7,15 +7,8 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.observers.train import DiscreteMeasurementObserver
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    TriggeredEvent,
-    input_signal,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.signal import input_signal, output_signal, parameter, state
 
 WORDS = "the table of the boiler ends at 12 bar"
 FROM = 0.29  # [s]

@@ -10,19 +10,8 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.block import FMI2Block, FMI3Block, make_block
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    Runtime,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    scalar_names,
-    state,
-    vector,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, Runtime, TriggeredEvent, vector
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, scalar_names, state
 
 H = 0.05
 """Communication step of the tests [s]: five internal steps of `Swing`."""

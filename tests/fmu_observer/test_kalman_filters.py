@@ -21,18 +21,9 @@ from fmu_observer.observers.generic.discrete.unscented_kalman_filter import Unsc
 from fmu_observer.observers.motors.motor_ekf import MotorEkf
 from fmu_observer.observers.train.balise_odometer_ekf import BaliseOdometerEkf
 from plant_models import PLANTS
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    Runtime,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    scalar_names,
-    state,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, Runtime
 from plant_models.hybrid.runtime import Runtime as Moving
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, scalar_names, state
 
 COUNT, T = 40, 0.1
 ANGLES = np.sin(0.3 * np.arange(COUNT)) + 0.01 * np.random.default_rng(1).normal(size=COUNT)

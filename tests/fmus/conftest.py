@@ -21,20 +21,8 @@ from toy_systems import Booster
 from fmu_observer.description import can_exchange
 from fmu_observer.event_protocol import EventProtocol
 from fmus import RECIPES, cached_fmu
-from plant_models.hybrid import (
-    CommunicationEvent,
-    HybridSystem,
-    PeriodicEvent,
-    Runtime,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    scalar_names,
-    state,
-    vector,
-)
+from plant_models.hybrid import CommunicationEvent, HybridSystem, PeriodicEvent, Runtime, TriggeredEvent, vector
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, scalar_names, state
 
 
 class Oscillator(HybridSystem):

@@ -8,16 +8,8 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable, Unknown
 
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, state
 
 
 class Gatekeeper(HybridSystem):

@@ -10,16 +10,8 @@ import numpy as np
 import pytest
 
 from fmus.content.generate import GenerationError, trace_equations
-from plant_models.hybrid import (
-    HybridSystem,
-    Signal,
-    TracingError,
-    TriggeredEvent,
-    input_signal,
-    output_signal,
-    state,
-    vector,
-)
+from plant_models.hybrid import HybridSystem, TracingError, TriggeredEvent, vector
+from plant_models.hybrid.signal import Signal, input_signal, output_signal, state
 
 
 class Hasty(HybridSystem):

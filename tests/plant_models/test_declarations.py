@@ -7,19 +7,8 @@ from typing import Any
 import pytest
 from toy_systems import Clockwork, Hyperbola
 
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    TracedSystem,
-    TracingError,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, TracedSystem, TracingError, TriggeredEvent
+from plant_models.hybrid.signal import Signal, input_signal, memory, output_signal, parameter, state
 
 
 def test_a_signal_has_a_legal_name_and_as_many_starts_as_elements() -> None:

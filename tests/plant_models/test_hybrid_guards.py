@@ -13,17 +13,12 @@ from plant_models.hybrid import (
     NumpyKernel,
     PeriodicEvent,
     Runtime,
-    Signal,
     TracedKernel,
     TracingError,
     TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
     vector,
 )
+from plant_models.hybrid.signal import Signal, input_signal, memory, output_signal, parameter, state
 
 
 def _payload(name: str) -> Signal:

@@ -15,16 +15,8 @@ from toy_systems import Clockwork, Hyperbola, Slider
 
 from fmu_observer.observers.parameter_values import parameter_values
 from plant_models import Locomotive, Odometer
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-    vector,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, vector
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, state
 from plant_models.interop import OperatingPointError, left_out, operating_point, to_nonlinear_io, to_state_space
 from plant_models.railway.adhesion import BURCKHARDT_NOMINAL
 

@@ -39,17 +39,8 @@ from fmu_observer.observers.exhibits.pitch_residuals import (
 )
 from fmu_observer.observers.exhibits.wind_turbine_limits import WARNINGS, repeats, warned
 from plant_models.exhibits.wind_turbine.rotor import Rotor
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-    vector,
-    warning_output,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, vector
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, parameter, warning_output
 
 
 class _Group(NamedTuple):

@@ -20,16 +20,9 @@ from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from fmu_observer.observers.generic.discrete.arrivals import at_sample, initialised_memory
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive
 from fmu_observer.observers.model_signals import LOG_LIKELIHOOD, sampling_event
-from plant_models.hybrid import (
-    Array,
-    Signal,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-)
+from plant_models.hybrid import Array
 from plant_models.hybrid.missing import is_there, or_else
+from plant_models.hybrid.signal import Signal, discrete_output, input_signal, memory, output_signal, parameter
 from plant_models.railway.traction.motor_equations import AXES, MOTOR_PARAMETERS, STATE_OUTPUTS, TRACTION_200_KW
 
 LOAD = output_signal("load_torque", "N.m", "Torque of the load against the rotation")

@@ -20,18 +20,9 @@ from fmu_observer.models.observer_model import named_as
 from fmu_observer.observers.train.standstill import held_disturbance, stands
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_signals import MOTION, SPEED
-from plant_models.hybrid import (
-    Array,
-    PeriodicEvent,
-    Signal,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import Array, PeriodicEvent, TriggeredEvent
 from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.signal import Signal, input_signal, memory, output_signal, parameter, state
 from plant_models.railway.vehicle.resistance import GRAVITY
 
 ORDER = 4  # position, speed, unknown acceleration, its rate

@@ -37,17 +37,8 @@ from fmu_observer.observers.train.train_signals import (
     SPEED,
     TRAIN_PARAMETERS,
 )
-from plant_models.hybrid import (
-    Array,
-    Signal,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-    vector,
-)
+from plant_models.hybrid import Array, vector
+from plant_models.hybrid.signal import Signal, discrete_output, input_signal, memory, output_signal, parameter, state
 from plant_models.railway.vehicle.resistance import GRAVITY
 
 ORDER = 4

@@ -32,9 +32,8 @@ from fmu_observer.observers.train.train_signals import (
     MOTION_OUTPUTS,
     POSITION,
 )
-from plant_models.hybrid import (
-    Array,
-    PeriodicEvent,
+from plant_models.hybrid import Array, PeriodicEvent
+from plant_models.hybrid.signal import (
     Signal,
     discrete_output,
     input_signal,

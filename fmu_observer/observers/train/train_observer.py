@@ -22,16 +22,8 @@ from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.train.standstill import ROLLS_BACK, rolls_back
 from fmu_observer.observers.train.train_signals import BALISE, MOTION_OUTPUTS, TRAIN_PARAMETERS
-from plant_models.hybrid import (
-    Array,
-    PeriodicEvent,
-    Signal,
-    TriggeredEvent,
-    input_signal,
-    output_signal,
-    parameter,
-    vector,
-)
+from plant_models.hybrid import Array, PeriodicEvent, TriggeredEvent, vector
+from plant_models.hybrid.signal import Signal, input_signal, output_signal, parameter
 
 
 class Estimate(NamedTuple):

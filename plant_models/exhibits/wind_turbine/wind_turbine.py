@@ -11,10 +11,8 @@ import numpy as np
 
 from plant_models.exhibits.wind_turbine.drive_train import DriveTrain
 from plant_models.exhibits.wind_turbine.rotor import Rotor
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, vector
+from plant_models.hybrid.signal import (
     discrete_output,
     input_signal,
     memory,
@@ -22,7 +20,6 @@ from plant_models.hybrid import (
     parameter,
     standard_normal,
     state,
-    vector,
     warning_output,
 )
 

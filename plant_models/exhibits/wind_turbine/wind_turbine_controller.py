@@ -9,15 +9,8 @@ from typing import Any
 import numpy as np
 
 from plant_models.exhibits.wind_turbine.rotor import Rotor, optimal_torque_gain
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, parameter
 
 LEAST_SPEED = 1.0  # [rad/s]; a generator that stands would be asked for an infinite torque
 

@@ -9,16 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-    vector,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, vector
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, parameter
 from plant_models.railway.control.logic import either, every, holds, some
 
 AXLES = 4

@@ -10,16 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, output_signal, parameter
 from plant_models.railway.control.effort_limits import (
     DRIVE_AND_BRAKES,
     PRESETS,

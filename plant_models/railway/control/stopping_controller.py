@@ -10,17 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    warning_output,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, output_signal, parameter, warning_output
 from plant_models.railway.control.logic import either, every, holds, some
 from plant_models.railway.control.stopping_planner import NEVER, BrakePlan, constant_brake, reference_motion
 

@@ -10,20 +10,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-    standard_normal,
-    vector,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, vector
 from plant_models.hybrid.noise import Purpose
 from plant_models.hybrid.option import require_chosen, require_whole
+from plant_models.hybrid.signal import Signal, discrete_output, input_signal, memory, parameter, standard_normal
 from plant_models.railway.network.protocols import loss_threshold, smallest, try_once_discard
 
 Protocol = Literal["round-robin", "periodic", "try-once-discard", "quadratic"]

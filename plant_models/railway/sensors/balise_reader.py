@@ -10,18 +10,9 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    CommunicationEvent,
-    HybridSystem,
-    Resource,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-    vector,
-)
+from plant_models.hybrid import Array, CommunicationEvent, HybridSystem, Resource, vector
 from plant_models.hybrid.option import require_chosen, require_whole
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, parameter
 from plant_models.railway.track.balise_layout import BaliseLayout, Positions, Spacing
 
 _HALVINGS = 6  # bring the bracket to 1/64 of the step

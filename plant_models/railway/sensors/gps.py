@@ -9,16 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-    standard_normal,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, parameter, standard_normal
 
 
 class Gps(HybridSystem):

@@ -9,16 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    discrete_output,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import Array, HybridSystem
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, output_signal, parameter, state
 from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window, reading_bound
 from plant_models.railway.sensors.sampling import sampling_event
 

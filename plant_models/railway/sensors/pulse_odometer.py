@@ -10,18 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-    standard_normal,
-    state,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
 from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, parameter, standard_normal, state
 from plant_models.railway.sensors.pulses import counted_pulses, pulse_length, pulses_in_window, reading_bound
 
 CountFrom = Literal["wheel_speed", "wheel_distance"]

@@ -6,16 +6,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    discrete_output,
-    input_signal,
-    memory,
-    parameter,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
 from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.signal import discrete_output, input_signal, memory, parameter
 from plant_models.railway.traction.motor_equations import AXES, FRAMES, MOTOR_PARAMETERS, TRACTION_200_KW, Frame
 from plant_models.railway.traction.transforms import to_rotor, to_stator
 

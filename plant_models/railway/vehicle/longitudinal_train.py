@@ -9,19 +9,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
-    Signal,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    vector,
-    warning_output,
-)
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, vector
 from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.signal import Signal, input_signal, memory, output_signal, parameter, warning_output
 from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
 from plant_models.railway.vehicle.resistance import (

@@ -17,16 +17,8 @@ from cosim import Scenario
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 from cosim.results.results_folder import write_results
 from fmus.build import build_fmu
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, TriggeredEvent
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, state
 
 STEP, COUNT = 0.1, 12
 STOP = STEP * COUNT

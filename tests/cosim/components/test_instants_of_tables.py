@@ -31,17 +31,8 @@ from cosim.structure.structure_text import when
 from fmus import cached_fmu
 from fmus.cli.commands import add_command
 from plant_models import PLANTS
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    Runtime,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    scalar_names,
-    state,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent, Runtime
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, scalar_names, state
 
 ALGORITHMS = ["gauss-seidel", "jacobi", "iterate"]
 

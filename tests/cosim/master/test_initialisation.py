@@ -12,15 +12,8 @@ from scipy.optimize import brentq
 
 from cosim.errors import RunError
 from cosim.master.initialisation import MAX_ROUNDS
-from plant_models.hybrid import (
-    HybridSystem,
-    PeriodicEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import HybridSystem, PeriodicEvent
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, state
 
 STIFFNESS, DAMPING, MASS = 3.0, 0.5, 2.0
 

@@ -7,16 +7,8 @@ from typing import Any
 import numpy as np
 
 from cosim import Outcome, Scenario
-from plant_models.hybrid import (
-    HybridSystem,
-    TriggeredEvent,
-    input_signal,
-    memory,
-    output_signal,
-    parameter,
-    state,
-    vector,
-)
+from plant_models.hybrid import HybridSystem, TriggeredEvent, vector
+from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, state
 
 STOP = 2.0
 

@@ -16,15 +16,8 @@ from fmu_observer.description import describe
 from fmus import cached_fmu
 from fmus.fmi.description import read_description
 from plant_models import PLANTS
-from plant_models.hybrid import (
-    HybridSystem,
-    OutputWarning,
-    Signal,
-    input_signal,
-    output_signal,
-    parameter,
-    state,
-)
+from plant_models.hybrid import HybridSystem
+from plant_models.hybrid.signal import OutputWarning, Signal, input_signal, output_signal, parameter, state
 
 
 class Kettle(HybridSystem):

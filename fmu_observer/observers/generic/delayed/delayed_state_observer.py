@@ -24,20 +24,9 @@ from fmu_observer.observers.generic.delayed.delayed_state_memory import (
 from fmu_observer.observers.generic.sampled.high_gain_sampled import HighGainSampled
 from fmu_observer.observers.generic.sampled.sampled_observer import per_measurement
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import (
-    Array,
-    PeriodicEvent,
-    Signal,
-    TriggeredEvent,
-    discrete_output,
-    input_signal,
-    matrix,
-    output_signal,
-    parameter,
-    state,
-    vector,
-)
+from plant_models.hybrid import Array, PeriodicEvent, TriggeredEvent, matrix, vector
 from plant_models.hybrid.option import require_chosen, require_whole
+from plant_models.hybrid.signal import Signal, discrete_output, input_signal, output_signal, parameter, state
 
 Between = Literal["predicted", "held"]
 BETWEEN: tuple[Between, ...] = ("predicted", "held")

@@ -21,18 +21,9 @@ from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.generic.sampled.takagi_sugeno_gains import GAINS, TakagiSugenoGains
 from fmu_observer.observers.model_signals import estimate_outputs, estimate_states, measured_inputs
 from fmu_observer.observers.parameter_values import Value, parameter_values
-from plant_models.hybrid import (
-    Array,
-    Signal,
-    TriggeredEvent,
-    discrete_output,
-    memory,
-    output_signal,
-    parameter,
-    state,
-    vector,
-)
+from plant_models.hybrid import Array, TriggeredEvent, vector
 from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.signal import Signal, discrete_output, memory, output_signal, parameter, state
 
 Premise = Literal["estimated", "live", "frozen"]
 PREMISES: tuple[Premise, ...] = ("estimated", "live", "frozen")

@@ -15,21 +15,18 @@ from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.parameter_values import Value, parameter_values
 from plant_models.exhibits.noisy_plant import NoisyPlant
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, vector
+from plant_models.hybrid.integration import rk4_step
+from plant_models.hybrid.scan import enclosed, scan
+from plant_models.hybrid.signal import (
     OutputWarning,
-    PeriodicEvent,
     Signal,
     discrete_output,
     input_signal,
     memory,
     parameter,
-    vector,
+    within_bounds,
 )
-from plant_models.hybrid.integration import rk4_step
-from plant_models.hybrid.scan import enclosed, scan
-from plant_models.hybrid.signal import within_bounds
 
 _OUTSIDE_CELLS = 0.5
 """Cells beyond its table from which a window counts as outside: less comes of rounding and of mild noise."""

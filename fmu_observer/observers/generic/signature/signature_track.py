@@ -9,20 +9,17 @@ from typing import Any, Literal
 import numpy as np
 
 from fmu_observer.formulas.signatures.pencil import NextScaling, pencil_point
-from plant_models.hybrid import (
-    Array,
-    HybridSystem,
-    PeriodicEvent,
+from plant_models.hybrid import Array, HybridSystem, PeriodicEvent, vector
+from plant_models.hybrid.option import require_chosen, require_whole
+from plant_models.hybrid.signal import (
     Signal,
     discrete_output,
     input_signal,
     memory,
     output_signal,
     parameter,
-    vector,
     warning_output,
 )
-from plant_models.hybrid.option import require_chosen, require_whole
 
 _CYCLES = 4.0
 """Tips before the properties count: the first two may be those of a transient."""
