@@ -5,16 +5,22 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
+from cosim.choice.allowance import Allowance
 from cosim.choice.benchmark_scores import BenchmarkScores
 from cosim.choice.candidates import BenchmarkCandidate, find_candidates
+from cosim.choice.disturbances import Disturbance, Journey
+from cosim.choice.disturbed_playback import believing, channels, disturbed
+from cosim.choice.known_parameters import derived_parameters, stated_parameters, true_signals
 from cosim.choice.observer_runs import ObserverRun, ObserverRuns
 from cosim.choice.observer_scores import ObserverScore, divergence, gap_certified, longest_gap, measured
 from cosim.choice.playback import ScenarioParts, find_parts, recording_scenario
 from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.evaluation.result_warnings import largest_tolerable
+from cosim.evaluation.roles import recorded as recorded_signal
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
@@ -60,6 +66,8 @@ def benchmark_observers(
     record: str | Path | None = None,
     recorded: str | Path | None = None,
     repeat: int = 1,
+    disturb: Callable[[Journey], Disturbance] | None = None,
+    allowance: Allowance | None = None,
     progress: Progress | None = None,
     warn: Callable[[str], None] | None = None,
 ) -> ObserverBenchmark:
@@ -67,13 +75,16 @@ def benchmark_observers(
 
     Args:
         scenario: with or without observers of its own.
-        observers: names of components of the scenario or of shipped observers, ``file.py:Class``, classes or instances.
-            None: the scenario's own, and all shipped train observers whose inputs and event the scenario can serve.
+        observers: names of components of the scenario or of shipped observers, with a preset as ``name:preset``,
+            ``file.py:Class``, classes or instances. None: the scenario's own, and every preset of all shipped train
+            observers whose inputs and event the scenario can serve.
         record: folder for the recording, an ordinary results folder; by default it is thrown away.
         recorded: folder of an earlier recording (or of any run of this scenario) to be played back instead of a new
             run.
         repeat: runs of each observer; the cost per step is the median of them. In each run it is the time in the calls
             of the observer, also where others are in the same run.
+        disturb: what is wrong with what observers know and hear, from where the train was; None for nothing.
+        allowance: what a position may be off; None for SUBSET-041.
         progress: called with what is done now, the number done and the number in all.
         warn: receives what is doubtful about the recorded run.
 
@@ -87,9 +98,11 @@ def benchmark_observers(
     if repeat < 1:
         raise ScenarioError(f"repeat must be at least 1, got {repeat}.")
     parts = find_parts(scenario)
-    candidates, notes = find_candidates(scenario, parts, observers)
-    if not candidates:
-        raise ScenarioError(f"{scenario.where}: no observer fits this scenario. " + " ".join(notes))
+    stated = stated_parameters(scenario, parts)
+    candidates, _ = find_candidates(scenario, parts, observers, stated)
+    if not candidates or (observers is None and all(c.misfit for c in candidates)):
+        reasons = "; ".join(dict.fromkeys(c.misfit for c in candidates))
+        raise ScenarioError(f"{scenario.where}: no observer fits this scenario: {reasons or 'none is named'}.")
     report = progress or (lambda _what, _done, _all: None)
     total = len(candidates) * repeat + 1
     with tempfile.TemporaryDirectory() as scratch:
@@ -97,18 +110,37 @@ def benchmark_observers(
         folder = Path(recorded or record or scratch)
         if recorded is None:
             _record(recording_scenario(scenario, parts), folder, warn, keep=record is not None)
-        runs = ObserverRuns(
-            scenario, parts, folder, repeat, lambda what, done: report(what, min(done + 1, total), total)
-        )
-        interrupted = _run(runs, candidates)
         result = load_result(folder)
+        known = derived_parameters(stated, parts, result)
+        candidates, notes = find_candidates(scenario, parts, observers, known)
+        wrong = Disturbance() if disturb is None else disturb(_journey(scenario, parts, result))
+        runs = ObserverRuns(
+            scenario,
+            parts,
+            folder,
+            repeat,
+            partial(disturbed, found=channels(wrong, parts, known), disturbance=wrong),
+            lambda what, done: report(what, min(done + 1, total), total),
+        )
+        interrupted = _run(runs, [believing(candidate, wrong) for candidate in candidates])
         report("done", total, total)
-    evaluation = _Evaluation.of(scenario, parts, result)
-    scores = _scores(evaluation, candidates, runs.found)
-    notes = [*_loop_notes(parts, result), *notes, *(_left_out(candidates, scores) if interrupted else ())]
-    outcomes = {name: run.outcome for name, run in runs.found.items() if run.outcome is not None}
-    spec, steps = _spec_of_all(parts.table.title, outcomes.values()), _steps(parts)
-    return ObserverBenchmark(scenario.name, spec, scores, tuple(notes), steps, outcomes, interrupted)
+    evaluation = _Evaluation.of(scenario, parts, result, allowance or Allowance())
+    return evaluation.benchmark(candidates, runs.found, notes, wrong, interrupted=interrupted)
+
+
+def _journey(scenario: Scenario, parts: ScenarioParts, result: Result) -> Journey:
+    """Where the train was.
+
+    Raises:
+        ScenarioError: nothing says which signals are its position and speed.
+    """
+    position, speed = (recorded_signal(result, name) for name in true_signals(parts))
+    if position is None or speed is None:
+        raise ScenarioError(
+            f"{scenario.where}: nothing says where the train truly is. Name the signals under [balises] (position, "
+            "speed) or [report] (true_position, true_speed)."
+        )
+    return Journey(result.time, position, speed)
 
 
 def _left_out(candidates: Sequence[BenchmarkCandidate], scores: Sequence[ObserverScore]) -> list[str]:
@@ -131,15 +163,6 @@ def _run(runs: ObserverRuns, candidates: Sequence[BenchmarkCandidate]) -> bool:
             raise
         return True
     return False
-
-
-def _scores(
-    evaluation: _Evaluation, candidates: Sequence[BenchmarkCandidate], runs: Mapping[str, ObserverRun]
-) -> tuple[ObserverScore, ...]:
-    """Scores of the observers that were run, and of those that cannot be, in the order of the candidates."""
-    misfits = {c.name: ObserverRun(refusal=c.misfit) for c in candidates if c.misfit}
-    known = {**runs, **misfits}
-    return tuple(evaluation.score(c, known[c.name]) for c in candidates if c.name in known)
 
 
 def _spec_of_all(title: str, outcomes: Iterable[Outcome]) -> ReportSpec:
@@ -189,24 +212,48 @@ class _Evaluation:
     """Makes scores of what the runs left.
 
     Args:
-        scenario: that was recorded. parts: of it. expected: gap to expect [s]; None without balises.
+        scenario: that was recorded. parts: of it. recorded: its run. allowance: what a position may be off.
+        expected: gap to expect [s]; None without balises.
         seen: longest gap in the recording [s], or None.
     """
 
     scenario: Scenario
     parts: ScenarioParts
-    expected: ExpectedGap | None
-    seen: float | None
+    recorded: Result
+    allowance: Allowance
+    expected: ExpectedGap | None = None
+    seen: float | None = None
 
     @classmethod
-    def of(cls, scenario: Scenario, parts: ScenarioParts, recorded: Result) -> Self:
+    def of(cls, scenario: Scenario, parts: ScenarioParts, recorded: Result, allowance: Allowance) -> Self:
         """The gaps to expect from a scenario, and the longest one in the recording."""
         table = with_seeds(parts.table)
         if table.balises is None:
-            return cls(scenario, parts, None, None)
+            return cls(scenario, parts, recorded, allowance)
         layout = make_layout(table.balises, table.start, table.stop, scenario.folder, scenario.where)
         events = [e for e in recorded.events if table.start < e.stamp <= table.stop]
-        return cls(scenario, parts, expected_gap(layout, table.balises, table.start), longest_gap(events, table.start))
+        expected = expected_gap(layout, table.balises, table.start)
+        return cls(scenario, parts, recorded, allowance, expected, longest_gap(events, table.start))
+
+    def benchmark(
+        self,
+        candidates: Sequence[BenchmarkCandidate],
+        found: Mapping[str, ObserverRun],
+        notes: Sequence[str],
+        wrong: Disturbance,
+        *,
+        interrupted: bool,
+    ) -> ObserverBenchmark:
+        """All that is known after the runs, in the order of the candidates."""
+        misfits = {c.name: ObserverRun(refusal=c.misfit) for c in candidates if c.misfit}
+        known = {**found, **misfits}
+        scores = tuple(self.score(c, known[c.name]) for c in candidates if c.name in known)
+        left_out = _left_out(candidates, scores) if interrupted else []
+        outcomes = {name: run.outcome for name, run in found.items() if run.outcome is not None}
+        spec = _spec_of_all(self.parts.table.title, outcomes.values())
+        texts = (*_loop_notes(self.parts, self.recorded), *notes, *left_out)
+        steps, tables = _steps(self.parts), {c.name: c for c in candidates}
+        return ObserverBenchmark(self.scenario.name, spec, scores, texts, steps, outcomes, interrupted, wrong, tables)
 
     def score(self, candidate: BenchmarkCandidate, run: ObserverRun) -> ObserverScore:
         """The score of one observer; one that fails has the reason in it."""
@@ -222,7 +269,7 @@ class _Evaluation:
         if outcome is None:
             return ObserverScore(name, failure=f"cannot be coupled: {run.refusal}", **known)
         kind = next(c["kind"] for c in outcome.result.summary["components"] if c["name"] == name)
-        scores = measured(outcome.result, outcome.spec, name)
+        scores = measured(outcome.result, outcome.spec, name, self.allowance)
         failure = outcome.failure or divergence(scores.get("whole"), largest_tolerable(outcome.result, outcome.spec))
         costs = tuple(_MICROSECONDS * cost for cost in run.costs)
         return ObserverScore(name, failure=failure, costs=costs, kind=kind, **known, **scores)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+from cosim.choice.candidates import BenchmarkCandidate
+from cosim.choice.disturbances import Disturbance
 from cosim.choice.observer_scores import ObserverScore
 from cosim.choice.observer_table import observer_table
 from cosim.evaluation.error_table import error_table
@@ -23,6 +25,7 @@ class BenchmarkScores(Readable):
         notes: what the reader must know: who acts on the train, what was assumed, what was left out.
         steps: communication steps of the run. outcomes: of the runs, by observer.
         interrupted: whether somebody stopped it; there are scores then of some observers only.
+        disturbance: what was wrong with what observers know and hear. candidates: how they are set, by observer.
     """
 
     scenario: str
@@ -32,6 +35,8 @@ class BenchmarkScores(Readable):
     steps: int
     outcomes: Mapping[str, Outcome]
     interrupted: bool = False
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    candidates: Mapping[str, BenchmarkCandidate] = field(default_factory=dict)
 
     @property
     def failed(self) -> list[str]:

@@ -4,18 +4,13 @@ knows of the train. Runs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import fmu_observer
-from cosim.choice.playback import (
-    SHARED_PARAMETERS,
-    Listener,
-    ScenarioParts,
-    settable,
-    train_observers,
-)
+from cosim.choice.known_parameters import SHARED_PARAMETERS, Known, settable, stated_parameters
+from cosim.choice.playback import Listener, ScenarioParts, connection, train_observers
 from cosim.errors import ScenarioError, nearest
 from cosim.run.balise_service import BALISE_EVENT
 from cosim.run.component_models import make_declared
@@ -24,9 +19,6 @@ from cosim.scenario.paths import absolute, move_file
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from plant_models.user_file import names_code
-
-OPTIONAL = {"odometer_fault"}
-"""Inputs that stay at their start value where nobody in a scenario knows them."""
 
 
 @dataclass(frozen=True)
@@ -50,27 +42,46 @@ class BenchmarkCandidate(Listener):
 
 
 def find_candidates(
-    scenario: Scenario, parts: ScenarioParts, names: Sequence[Any] | None
+    scenario: Scenario, parts: ScenarioParts, names: Sequence[Any] | None, known: Known | None = None
 ) -> tuple[list[BenchmarkCandidate], list[str]]:
-    """The observers to be evaluated, and notes on what was assumed and left out.
+    """The observers to be evaluated, those that cannot listen here among them, and notes on what was assumed.
 
     Args:
-        scenario: for messages. parts: of it. names: those asked for; None for all that fit.
+        scenario: for messages. parts: of it.
+        names: those asked for, with a preset as ``name:preset``; None for those of the scenario and every preset of all
+            shipped train observers.
+        known: of the train; None for what the scenario says.
 
     Raises:
         ScenarioError: a name is neither an observer of the scenario nor a shipped one.
     """
+    found = stated_parameters(scenario, parts) if known is None else known
     if names is not None:
         asked = {name if isinstance(name, str) else id(name): name for name in names}
-        found = _distinct([_named(scenario, parts, name) for name in asked.values()])
-        return found, [f"{c.name}: {text}" for c in found for text in c.settings]
+        named = _distinct([_named(scenario, parts, name, found) for name in asked.values()])
+        return named, [f"{c.name}: {text}" for c in named for text in c.settings]
     own = [_own(parts, name) for name in parts.observers]
-    used = {parts.table.components[name].observer for name in parts.observers}
-    others = [_shipped(parts, name) for name in train_observers() if name not in used]
-    reasons = dict.fromkeys(c.misfit for c in others if c.misfit)
-    left_out = [f"left out, as {why}: {', '.join(c.model for c in others if c.misfit == why)}" for why in reasons]
-    found = [*own, *(c for c in others if not c.misfit)]
-    return found, [*(f"{c.name}: {text}" for c in found for text in c.settings), *left_out]
+    used = {(table.observer, _preset(table)) for c in own if not (table := c.table).options}
+    others = [_shipped(parts, name, found, preset) for name, preset in shipped_rows() if (name, preset) not in used]
+    every = [*own, *others]
+    return every, [f"{c.name}: {text}" for c in every if not c.misfit for text in c.settings]
+
+
+def shipped_rows() -> list[tuple[str, str | None]]:
+    """Name and preset of all shipped train observers; None as the preset of one that stands as it is."""
+    rows: list[tuple[str, str | None]] = []
+    for name, kind in train_observers().items():
+        system = kind()
+        own = None if system.default_preset is None else str(system.default_preset)
+        rows += [(name, preset) for preset in dict.fromkeys((own, *system.presets))]
+    return rows
+
+
+def _preset(table: ComponentTable) -> str | None:
+    """The preset that an observer has here, also where it is its own default."""
+    system = make_declared(table, "")
+    own = getattr(system, "default_preset", None)
+    return table.preset or (None if own is None else str(own))
 
 
 def _distinct(candidates: Sequence[BenchmarkCandidate]) -> list[BenchmarkCandidate]:
@@ -80,7 +91,7 @@ def _distinct(candidates: Sequence[BenchmarkCandidate]) -> list[BenchmarkCandida
     return [replace(c, name=f"{c.name}_{n + 1}") if n else c for c, n in zip(candidates, earlier, strict=True)]
 
 
-def _named(scenario: Scenario, parts: ScenarioParts, given: Any) -> BenchmarkCandidate:
+def _named(scenario: Scenario, parts: ScenarioParts, given: Any, known: Known) -> BenchmarkCandidate:
     """An observer of the scenario, or one by the name of its model, or a class or an instance from a script."""
     if isinstance(given, str) and given in parts.observers:
         return _own(parts, given)
@@ -88,36 +99,41 @@ def _named(scenario: Scenario, parts: ScenarioParts, given: Any) -> BenchmarkCan
         name = ModelName.of(given)
     except ValueError as error:
         raise ScenarioError(f"{scenario.where}: {error}") from error
+    model, _, preset = name.partition(":")
+    if name.given is None and preset and model in fmu_observer.OBSERVERS:
+        return _shipped(parts, model, known, preset)
     if name.given is None and not names_code(name) and name not in fmu_observer.OBSERVERS:
-        known = [*parts.observers, *(n for n in train_observers() if n not in parts.observers)]
-        raise ScenarioError(f"{scenario.where}: unknown observer {name!r}; {nearest(name, known)}")
+        others = [*parts.observers, *(n for n in train_observers() if n not in parts.observers)]
+        raise ScenarioError(f"{scenario.where}: unknown observer {name!r}; {nearest(name, others)}")
     if name.given is None:
         name = ModelName.of(move_file(name, lambda path: absolute(path, ".")))
-    return _shipped(parts, name)
+    return _shipped(parts, name, known)
 
 
 def _own(parts: ScenarioParts, name: str) -> BenchmarkCandidate:
     return BenchmarkCandidate(name, parts.table.components[name], parts.sources(name), "scenario")
 
 
-def _shipped(parts: ScenarioParts, model: str) -> BenchmarkCandidate:
-    """An observer with its own defaults and what the scenario says of the train."""
+def _shipped(parts: ScenarioParts, model: str, known: Known, preset: str | None = None) -> BenchmarkCandidate:
+    """An observer with its own defaults or a preset, and what is known of the train."""
     own = settings_of(getattr(model, "given", None))  # what an instance says of the train stands
-    table = ComponentTable.model_validate({"observer": model, **own})
+    chosen = {} if preset is None else {"preset": preset}
+    table = ComponentTable.model_validate({"observer": model, **chosen, **own})
     system = make_declared(table, model)
-    name = model.rpartition(":")[2].replace(".", "_")
-    parameters = {s.name for s in settable(system)}
-    unset = parameters - table.parameters.keys()
-    shared = {name: known for name, known in parts.shared_parameters.items() if name in unset}
+    default = preset is None or preset == getattr(system, "default_preset", None)
+    name = model.rpartition(":")[2].replace(".", "_") + ("" if default else f"_{preset}")
+    wanted = {s.name for s in settable(system) if s.name in SHARED_PARAMETERS}
+    shared = {n: v for n, v in known.items() if n in wanted and n not in table.parameters}
     values = {name: value for name, (value, _) in shared.items()}
-    table = table.model_copy(update={"parameters": {**table.parameters, **values}})
+    label = model if preset is None else f"{model}:{preset}"
+    table = table.model_copy(update={"parameters": {**table.parameters, **values}, "label": label})
     sources = {s.name: parts.template[s.name] for s in system.inputs if s.name in parts.template}
     unique = name if name not in parts.table.components else f"{name}_with_defaults"
-    settings = (_assumed(system, shared),) if parameters & set(SHARED_PARAMETERS) else ()
+    settings = (_assumed(system, shared),) if wanted else ()
     return BenchmarkCandidate(unique, table, sources, "defaults", settings, _misfit(parts, system, sources))
 
 
-def _assumed(system: Any, shared: Mapping[str, tuple[float, str]]) -> str:
+def _assumed(system: Any, shared: Known) -> str:
     given = ", ".join(f"{name} = {value:g} ({why})" for name, (value, why) in shared.items())
     units = {s.name: (s.start, s.unit) for s in settable(system)}
     rest = ", ".join(
@@ -135,9 +151,28 @@ def _misfit(parts: ScenarioParts, system: Any, sources: Iterable[str]) -> str:
     """Why an observer cannot listen here, or an empty text."""
     triggered = getattr(system, "triggered_events", ())  # plain Python says with its `balise` what it takes
     payload = {s.name for event in triggered for s in event.payload}
-    missing = [s.name for s in system.inputs if s.name not in sources and s.name not in payload | OPTIONAL]
+    missing = [s.name for s in system.inputs if not s.optional and s.name not in {*sources, *payload}]
     if missing:
         return f"nothing in this scenario gives its input{'s' if len(missing) > 1 else ''} {', '.join(missing)}"
     if BALISE_EVENT in [event.name for event in triggered] and parts.table.balises is None:
         return "it is corrected by balises, and this scenario has none"
     return ""
+
+
+def with_candidate(scenario: Scenario, candidate: BenchmarkCandidate) -> Scenario:
+    """The scenario with an observer as it was played, on which its report is.
+
+    Args:
+        scenario: the scenario. candidate: the observer; one of the scenario's own is there already.
+
+    Raises:
+        ScenarioError: the observer cannot listen here.
+    """
+    if candidate.misfit:
+        raise ScenarioError(f"{candidate.name} cannot be coupled: {candidate.misfit}")
+    changed = scenario.copy()
+    if candidate.name not in changed.table().components:
+        changed.add(candidate.name, **candidate.table.model_dump(by_alias=True, exclude_unset=True))
+        lines = [connection(link, f"{candidate.name}.{signal}") for signal, link in candidate.sources.items()]
+        changed.connect(*lines)  # type: ignore[arg-type] # tables as well as texts
+    return changed.report(observers=[candidate.name])

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from cosim.choice.playback import (
     Listener,
@@ -44,7 +45,8 @@ class ObserverRuns:
 
     Args:
         scenario: that was recorded. parts: of it. folder: with the results of the plant side.
-        repeat: runs of each observer. progress: called with what is run now and the number of runs of an observer done.
+        repeat: runs of each observer. disturb: changes the tables of each run.
+        progress: called with what is run now and the number of runs of an observer done.
         found: what is known so far, by observer; kept where somebody interrupts.
     """
 
@@ -52,14 +54,12 @@ class ObserverRuns:
     parts: ScenarioParts
     folder: Path
     repeat: int
+    disturb: Callable[[dict[str, Any]], dict[str, Any]]
     progress: Callable[[str, int], None]
     found: dict[str, ObserverRun] = field(default_factory=dict)
 
     def run(self, listeners: Sequence[Listener]) -> None:
         """Run them all.
-
-        Args:
-            listeners: the observers.
 
         Args:
             listeners: observers beside the recording.
@@ -92,7 +92,7 @@ class ObserverRuns:
             self._run(part)
 
     def _once(self, group: Sequence[Listener]) -> Outcome:
-        outcome = playback_scenario(self.scenario, self.parts, self.folder, group).run(warn=_ignore)
+        outcome = playback_scenario(self.scenario, self.parts, self.folder, group, self.disturb).run(warn=_ignore)
         if outcome.failure == INTERRUPTED:
             raise KeyboardInterrupt
         return outcome

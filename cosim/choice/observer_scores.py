@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.choice.allowance import Allowance, UsedAllowance, used_allowance
 from cosim.evaluation.balise_gaps import rows_before
 from cosim.evaluation.event_counts import USED
 from cosim.evaluation.indicators import IndicatorStatistics, indicator_statistics, on_intervals
@@ -57,6 +58,7 @@ class ObserverScore:
         certificate: the gap certified, held against the longest expected and, as its condition, the longest seen; None
             where nothing is known about gaps, or there are no balises.
         telegrams: what became of them, by outcome. costs: per communication step, one for each repetition [us].
+        used: how much of the allowance it uses; None where positions are not known.
         kind: ``FMU`` or ``block``.
         in_loop: whether it acts on the train in the scenario.
     """
@@ -76,6 +78,7 @@ class ObserverScore:
     certificate: Finding | None = None
     telegrams: Mapping[str, int] = field(default_factory=dict)
     costs: tuple[float, ...] = ()
+    used: UsedAllowance | None = None
     kind: str = ""
     in_loop: bool = False
 
@@ -97,11 +100,11 @@ class ObserverScore:
         return data
 
 
-def measured(result: Result, spec: ReportSpec, name: str) -> dict[str, Any]:
+def measured(result: Result, spec: ReportSpec, name: str, allowance: Allowance) -> dict[str, Any]:
     """Errors, indications and telegrams of one observer, as arguments of `ObserverScore`.
 
     Args:
-        result: the run. spec: roles; `name` is one of its observers.
+        result: the run. spec: roles; `name` is one of its observers. allowance: what its position may be off.
     """
     time = result.time
     if not len(time):
@@ -115,6 +118,7 @@ def measured(result: Result, spec: ReportSpec, name: str) -> dict[str, Any]:
         "speed_at_balises": error_at_balises(result, spec, name, "speed"),
         "position_at_balises": error_at_balises(result, spec, name, "position"),
         "telegrams": telegram_outcomes(result.events, name),
+        "used": used_allowance(result, spec, name, allowance),
     }
     statistics = indicator_statistics(result, own)
     if statistics:

@@ -6,7 +6,7 @@ the loop belongs to it too.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,7 @@ import fmu_observer
 from cosim.coupling.connection import Link
 from cosim.errors import ScenarioError
 from cosim.run.balise_service import BALISE_EVENT
-from cosim.run.component_models import make_declared, make_system
+from cosim.run.component_models import make_declared
 from cosim.run.connections import parse_connections
 from cosim.run.described_components import describe_component
 from cosim.run.signal_roles import ROLES, roles_of_balises
@@ -24,23 +24,10 @@ from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
 from cosim.simulation.scenario import Scenario
 from fmu_observer.observers.gated_observer import GatedObserver
-from plant_models.hybrid import Signal
 
 _ESTIMATES = ("position", "speed")
 _PLAYED_MASTER = ("algorithm", "inputs", "events", "stepper", "record_memory")
 """Keys of the master table that matter to an observer that only listens: when its inputs reach it, and how."""
-SHARED_PARAMETERS = (
-    "mass",
-    "davis_a",
-    "davis_b",
-    "davis_c",
-    "wheel_radius",
-    "wheel_inertia",
-    "n_axles",
-    "estimated_position",
-    "estimated_speed",
-)
-"""What every train observer knows of the train, and where it believes it to start."""
 
 
 @dataclass(frozen=True)
@@ -80,39 +67,24 @@ class ScenarioParts:
     @property
     def acting(self) -> tuple[str, ...]:
         """Observers that act on the train; all that are listened to where nobody says which component the train is."""
+        if not self.train:
+            return self.in_loop
+        before = _ancestors([self.train], self.links, self.table.components)
+        return tuple(name for name in self.in_loop if name in before)
+
+    @property
+    def train(self) -> str:
+        """The component that is the train, as far as balises or the report name it; else an empty text."""
         balises, report = self.table.balises, self.table.report
         position = (None if balises is None else balises.position) or report.true_position or report.true_speed or ""
         train = position.partition(".")[0]
-        if train not in self.table.components:
-            return self.in_loop
-        before = _ancestors([train], self.links, self.table.components)
-        return tuple(name for name in self.in_loop if name in before)
+        return train if train in self.table.components else ""
 
-    @cached_property
-    def shared_parameters(self) -> Mapping[str, tuple[float, str]]:
-        """What the scenario says of the train that an observer should know too: value, and who says so.
-
-        What its own observers, as far as they want to know it, agree on comes first; then parameters and
-        preset of the plant.
-        """
-        found: dict[str, tuple[float, str]] = {}
-        tables = [self.table.components[name] for name in self.observers]
-        settables = [
-            set(SHARED_PARAMETERS) if t.observer is None else {s.name for s in settable(make_declared(t, ""))}
-            for t in tables
-        ]
-        for parameter in SHARED_PARAMETERS:
-            wanting = [table for table, known in zip(tables, settables, strict=True) if parameter in known]
-            stated = [table.parameters.get(parameter) for table in wanting]
-            values = {value for value in stated if isinstance(value, int | float) and not isinstance(value, bool)}
-            if len(values) == 1 and None not in stated:
-                found[parameter] = float(values.pop()), "as for the observers of the scenario"
-        plant = "" if self.table.balises is None else (self.table.balises.position or "").partition(".")[0]
-        plant = plant or (self.table.report.true_speed or "").partition(".")[0]
-        if plant in self.table.components:
-            for parameter, value in _plant_values(self.table.components[plant]).items():
-                found.setdefault(parameter, (value, f"as for {plant}"))
-        return found
+    @property
+    def odometer(self) -> str | None:
+        """The odometer that the scenario declares, as ``component.signal``; None where it declares none."""
+        balises = self.table.balises
+        return self.table.report.odometer or (None if balises is None else balises.odometer)
 
     def sources(self, name: str) -> dict[str, Link]:
         """Where the inputs of a component come from.
@@ -124,17 +96,16 @@ class ScenarioParts:
 
     @cached_property
     def template(self) -> Mapping[str, Link]:
-        """Where an input of this name comes from in this scenario: as for its observers, else as for the plant side."""
+        """Where an input of this name comes from: the odometer is the declared one, all else comes as for the observers
+        of the scenario, else as for the plant side.
+        """
         found: dict[str, Link] = {}
-        odometer = self.table.report.odometer or (
-            self.table.balises.odometer if self.table.balises is not None else None
-        )
+        if self.odometer is not None and self.odometer.partition(".")[0] in self.plant:
+            found["odometer"] = (self.odometer, "odometer")
         for name in (*self.observers, *self.plant):
             for signal, link in self.sources(name).items():
                 if link[0].partition(".")[0] in self.plant:
                     found.setdefault(signal, link)
-        if odometer is not None:
-            found.setdefault("odometer", (odometer, "odometer"))
         return found
 
 
@@ -208,13 +179,18 @@ def recording_scenario(scenario: Scenario, parts: ScenarioParts) -> Scenario:
 
 
 def playback_scenario(
-    scenario: Scenario, parts: ScenarioParts, folder: Path, listeners: Sequence[Listener]
+    scenario: Scenario,
+    parts: ScenarioParts,
+    folder: Path,
+    listeners: Sequence[Listener],
+    disturb: Callable[[dict[str, Any]], dict[str, Any]] = dict,
 ) -> Scenario:
     """Observers beside the recording.
 
     Args:
         scenario: that was recorded. parts: of it. folder: with the results of the plant side.
         listeners: the observers; none has the name of a component that another one needs, see `needed_components`.
+        disturb: changes the tables of the scenario.
 
     Raises:
         ScenarioError: an observer listens to itself.
@@ -237,7 +213,7 @@ def playback_scenario(
         data["balises"] = watched | {"timing": balises.timing, "layout": "recorded", "file": str(folder.resolve())}
     if network:
         data["network"] = network
-    return _scenario(scenario, data)
+    return _scenario(scenario, disturb(data))
 
 
 def needed_components(parts: ScenarioParts, listener: Listener) -> list[str]:
@@ -253,7 +229,7 @@ def needed_components(parts: ScenarioParts, listener: Listener) -> list[str]:
     used = [link[0] for link in listener.sources.values()]
     used += [value for value in _roles(table, [listener.name]).values() if isinstance(value, str)]
     used += [v for key in _ESTIMATES if table.balises is not None and (v := getattr(table.balises, key)) is not None]
-    used += _network_of(parts, [listener.name]).get("signals", [])
+    used += [name for names in _network_of(parts, [listener.name]).get("nodes", {}).values() for name in names]
     wanted = list(dict.fromkeys(signal.partition(".")[0] for signal in used))
     if listener.name in wanted and listener.name in parts.in_loop:
         raise ScenarioError(f"{listener.name}: listens to itself; a recording cannot take its place.")
@@ -353,24 +329,4 @@ def train_observers() -> dict[str, type[GatedObserver]]:
         if isinstance(kind, type)
         and issubclass(kind, GatedObserver)
         and {signal.name for signal in kind.outputs}.issuperset(_ESTIMATES)
-    }
-
-
-def settable(system: Any) -> tuple[Signal, ...]:
-    """What a component's table may say to a model: its parameters and, of a hybrid system, its states at the start.
-
-    Args:
-        system: a hybrid system, or a model of plain Python.
-    """
-    return (*system.parameter_signals, *getattr(system, "states", ()))
-
-
-def _plant_values(table: ComponentTable) -> dict[str, float]:
-    system = make_system(table, "")
-    preset: Mapping[str, Any] = {} if system is None or table.preset is None else system.presets[table.preset]
-    given = {**preset, **table.parameters}
-    return {
-        parameter: float(given[parameter])
-        for parameter in SHARED_PARAMETERS
-        if isinstance(given.get(parameter), int | float)
     }

@@ -14,16 +14,16 @@ from cosim.simulation.scenario import Scenario
 from fmus.cli.progress import ProgressBar
 
 
-def load_scenario(options: argparse.Namespace) -> Scenario:
+def load_scenario(options: argparse.Namespace, loaded: Scenario | None = None) -> Scenario:
     """The scenario that the arguments name, with its overrides.
 
     Args:
-        options: of the command line.
+        options: of the command line. loaded: to be changed in place of the one that is named; None for that.
 
     Raises:
         ScenarioError: there is none, or an override is not ``NAME=VALUE``.
     """
-    scenario = Scenario.load(options.scenario, strict=getattr(options, "strict", False))
+    scenario = loaded or Scenario.load(options.scenario, strict=getattr(options, "strict", False))
     stated = [parse_setting(setting) for setting in options.settings]
     for name, value in sorted(stated, key=lambda entry: entry[0] != CASE):  # what is said by name wins over a case
         scenario.set(name, value)

@@ -158,7 +158,7 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
         The errors; without gaps where there is no true position, or fewer than two balises were read.
     """
     place = recorded(result, spec.true_position)
-    telegrams = _read(result.events)
+    telegrams = telegrams_read(result.events)
     if place is None or len(telegrams) < 2:
         return GapErrors((), {}, {})
     times = np.array([event.delivered_at for event in telegrams])
@@ -232,8 +232,12 @@ def root_mean_square(errors: np.ndarray) -> float:
     return scale * float(np.sqrt(np.mean((errors / scale) ** 2)))  # scaled: the square of a diverged one would overflow
 
 
-def _read(events: Sequence[BaliseRecord]) -> list[BaliseRecord]:
-    """Telegrams of balises that were read and delivered, in order of their stamps, one at an instant."""
+def telegrams_read(events: Sequence[BaliseRecord]) -> list[BaliseRecord]:
+    """Telegrams of balises that were read and delivered, in the order of delivery, one at an instant.
+
+    Args:
+        events: of a run.
+    """
     delivered = [event for event in events if event.kind == "true" and np.isfinite(event.delivered_at)]
     by_time = {event.delivered_at: event for event in sorted(delivered, key=lambda event: event.stamp)}
     return [by_time[time] for time in sorted(by_time)]

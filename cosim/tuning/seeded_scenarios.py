@@ -8,15 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cosim.choice.candidates import BenchmarkCandidate, find_candidates
+from cosim.choice.candidates import BenchmarkCandidate, find_candidates, with_candidate
 from cosim.choice.playback import (
     ScenarioParts,
-    connection,
     find_parts,
     playback_scenario,
     recording_scenario,
 )
-from cosim.errors import ScenarioError
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost
 
@@ -84,17 +82,10 @@ def with_observer(scenario: Scenario, name: str) -> tuple[Scenario, str]:
     Raises:
         ScenarioError: there is neither, or the observer cannot listen here.
     """
-    changed = scenario.copy()
-    if name not in changed.table().components:
-        parts = find_parts(changed)
-        (candidate,), _ = find_candidates(changed, parts, [name])
-        if candidate.misfit:
-            raise ScenarioError(f"{name} cannot be coupled: {candidate.misfit}")
-        changed.add(candidate.name, **candidate.table.model_dump(by_alias=True, exclude_unset=True))
-        lines = [connection(link, f"{candidate.name}.{signal}") for signal, link in candidate.sources.items()]
-        changed.connect(*lines)  # type: ignore[arg-type] # tables as well as texts
-        name = candidate.name
-    return changed.report(observers=[name]), name
+    if name in scenario.table().components:
+        return scenario.copy().report(observers=[name]), name
+    (candidate,), _ = find_candidates(scenario, find_parts(scenario), [name])
+    return with_candidate(scenario, candidate), candidate.name
 
 
 def why_whole(scenario: Scenario, observer: str | None, heads: Sequence[str]) -> str:

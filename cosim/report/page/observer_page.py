@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,12 +34,28 @@ _HOW = (
 )
 
 
-def write_benchmark(benchmark: BenchmarkScores, directory: str | Path) -> dict[str, Path]:
+@dataclass(frozen=True)
+class Answer:
+    """What follows from a comparison.
+
+    Args:
+        text: in a line. good: whether it is a good one. groups: observers by what they are good for.
+        data: plain data, to be written in place of those of the comparison.
+    """
+
+    text: str
+    good: bool
+    groups: Sequence[Table]
+    data: Mapping[str, Any]
+
+
+def write_benchmark(benchmark: BenchmarkScores, directory: str | Path, answer: Answer | None = None) -> dict[str, Path]:
     """Write page and data of a comparison of observers.
 
     Args:
         benchmark: what to write.
         directory: the folder; created where it does not exist.
+        answer: what follows from it and from other runs; None for nothing but the comparison.
 
     Returns:
         Paths by kind: ``page``, ``data``.
@@ -47,18 +64,18 @@ def write_benchmark(benchmark: BenchmarkScores, directory: str | Path) -> dict[s
         OutputError: the folder cannot be written; former files are then still whole.
     """
     folder = Path(directory)
-    data = json.dumps(jsonable(benchmark.to_data()), indent=2) + "\n"
-    contents = {PAGE: page_bytes(live_page(benchmark_page(benchmark))), DATA: data.encode("utf-8")}
+    data = json.dumps(jsonable(benchmark.to_data() if answer is None else answer.data), indent=2) + "\n"
+    contents = {PAGE: page_bytes(live_page(benchmark_page(benchmark, answer))), DATA: data.encode("utf-8")}
     with explained(f"The comparison cannot be written to {folder}", "Choose another output folder."):
         write_files(folder, contents)
     return {"page": folder / PAGE, "data": folder / DATA}
 
 
-def benchmark_page(benchmark: BenchmarkScores) -> LivePage:
+def benchmark_page(benchmark: BenchmarkScores, answer: Answer | None = None) -> LivePage:
     """What the page of a comparison of observers shows.
 
     Args:
-        benchmark: what was compared.
+        benchmark: what was compared. answer: what follows from it.
     """
     result, spec = _merged_result(benchmark), benchmark.labelled_spec()
     if result is not None:
@@ -69,13 +86,14 @@ def benchmark_page(benchmark: BenchmarkScores) -> LivePage:
     lead = f"{len(benchmark.scores)} observers, each alone beside the same recorded run of {benchmark.steps} steps."
     return LivePage(
         title=f"Observers on one run: {benchmark.spec.title}",
-        verdict=_verdict(benchmark),
+        verdict=_verdict(benchmark) if answer is None else Verdict(answer.text, "" if answer.good else "bad"),
         lead=lead,
         recordings=[] if result is None else [run_recording(result, spec)],
         panels=[] if result is None else run_panels(result, spec),
         marks=[] if result is None else run_marks(result, spec),
         settled=spec.evaluate_after,
         sections=[
+            *([] if answer is None else [Section("Choice", [Rows(g) for g in answer.groups if g], is_open=True)]),
             Section("Without numbers, or cut short", [failed], mood="doubt"),
             Section("Overview", [Rows(benchmark.table())], is_open=True),
             Section("Errors by phase", [Rows(benchmark.errors(), plots=False)]),

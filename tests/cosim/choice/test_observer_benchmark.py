@@ -19,7 +19,8 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.choice.benchmark import ObserverBenchmark, benchmark_observers
-from cosim.choice.candidates import find_candidates
+from cosim.choice.candidates import find_candidates, shipped_rows
+from cosim.choice.known_parameters import Known, stated_parameters
 from cosim.choice.observer_scores import (
     SEEN_GAP,
     ObserverScore,
@@ -31,13 +32,14 @@ from cosim.choice.observer_scores import (
     telegram_outcomes,
 )
 from cosim.choice.observer_table import observer_table
-from cosim.choice.playback import find_parts, train_observers
+from cosim.choice.playback import find_parts
 from cosim.errors import RunError, ScenarioError
 from cosim.evaluation.metrics import PhaseMetrics, _ErrorSize, phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.master.master import Master
 from cosim.results.load_result import load_result
 from cosim.results.result import BaliseRecord, Result, SignalInfo
+from plant_models.railway.vehicle.locomotive import Locomotive
 
 
 def quietly(scenario: Scenario) -> Any:
@@ -196,26 +198,46 @@ def test_a_certificate_is_held_against_both_gaps() -> None:
 # -----------------------------------------------------------------------------------------------------------
 
 
-def test_by_default_all_take_part_that_fit_and_the_others_are_named() -> None:
+def test_by_default_every_preset_takes_part_and_is_set_to_this_train() -> None:
     scenario = two()
-    found, notes = find_candidates(scenario, find_parts(scenario), None)
-    names = [candidate.name for candidate in found]
-    assert names[:2] == ["observer", "uio"]
-    left_out = {"augmented_high_gain_cdo", "augmented_takagi_sugeno_cdo"}
-    assert set(names[2:]) == train_observers().keys() - {"takagi_sugeno_cdo", "discrete_uio"} - left_out
-    assert {"adaptive_gain_cdo", "differentiator_cdo", "multirate_cdo", "odometer_reset"} < set(names)
-    assert any("gradient" in note and "augmented_high_gain_cdo" in note for note in notes)
+    found, _ = find_candidates(scenario, find_parts(scenario), None)
+    assert [candidate.name for candidate in found[:2]] == ["observer", "uio"]
+    rows = {(c.model, c.table.preset) for c in found[2:]}
+    assert rows == set(shipped_rows()) - {("takagi_sugeno_cdo", "repaired"), ("discrete_uio", None)}
+    assert not [c.misfit for c in found if c.misfit]
+    assert len({candidate.name for candidate in found}) == len(found)
     fits = {c.name: {signal: link[0] for signal, link in c.sources.items()} for c in found}
     assert fits["adaptive_gain_cdo"] == {"effort": "driver.effort", "odometer": "odometer.reading"}
 
 
-def test_facts_come_from_the_observers_where_they_agree_else_from_the_plant() -> None:
+def test_what_an_observer_cannot_have_is_said() -> None:
+    scenario = two()
+    (found,), _ = find_candidates(scenario, find_parts(scenario), ["takagi_sugeno_cdo:long_gaps"])
+    assert (found.name, found.table.preset, found.misfit) == ("takagi_sugeno_cdo_long_gaps", "long_gaps", "")
+    with pytest.raises(ScenarioError, match="no preset 'long_gap'"):
+        find_candidates(scenario, find_parts(scenario), ["takagi_sugeno_cdo:long_gap"])
+
+
+def known(scenario: Scenario) -> Known:
+    return stated_parameters(scenario, find_parts(scenario))
+
+
+def test_what_is_known_comes_from_the_observers_where_they_agree_else_from_the_plant() -> None:
     scenario = two().set("observer.mass", 80e3).set("locomotive.davis_b", 30.0).set("locomotive.mass", 95e3)
-    facts = find_parts(scenario).shared_parameters
-    assert facts["mass"] == (80e3, "as for the observers of the scenario")
-    assert facts["davis_b"] == (30.0, "as for locomotive")
-    assert "wheel_radius" not in facts
-    assert find_parts(scenario.set("uio.mass", 70e3)).shared_parameters["mass"] == (95e3, "as for locomotive")
+    found = known(scenario)
+    assert found["mass"] == (80e3, "as for the observers of the scenario")
+    assert found["davis_b"] == (30.0, "as for locomotive")
+    assert known(scenario.set("uio.mass", 70e3))["mass"] == (95e3, "as for locomotive")
+
+
+def test_what_the_plant_is_by_default_is_known_too() -> None:
+    """An observer whose own default is another train would be told of 1 kg."""
+    found = known(two())
+    plant = Locomotive()
+    starts = {signal.name: signal.start for signal in plant.parameter_signals}
+    assert found["davis_a"] == (starts["davis_a"], "as for locomotive")
+    assert found["wheel_radius"] == (starts["wheel_radius"], "as for locomotive")
+    assert found["odometer_period"] == (0.01, "of the odometer")
 
 
 def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
@@ -223,10 +245,10 @@ def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:
     scenario.set("uio.estimated_position", 7.0).add("plain", observer="odometer_reset").connect(
         "odometer.reading -> plain.odometer"
     )
-    facts = find_parts(scenario.set("plain.estimated_position", 7.0)).shared_parameters
-    assert facts["mass"][0] == 80e3  # the plain odometer has no mass
-    assert facts["estimated_position"] == (7.0, "as for the observers of the scenario")
-    assert "estimated_position" not in find_parts(scenario.set("plain.estimated_position", 0.0)).shared_parameters
+    found = known(scenario.set("plain.estimated_position", 7.0))
+    assert found["mass"][0] == 80e3  # the plain odometer has no mass
+    assert found["estimated_position"] == (7.0, "as for the observers of the scenario")
+    assert "estimated_position" not in known(scenario.set("plain.estimated_position", 0.0))
 
 
 def test_no_limit_is_reported_as_any_gap() -> None:
@@ -238,7 +260,11 @@ def test_no_limit_is_reported_as_any_gap() -> None:
 def test_a_scenario_without_observers_serves_shipped_ones() -> None:
     data = small().table().model_dump(by_alias=True, exclude_unset=True)
     del data["components"]["observer"]
-    data["connections"] = ["driver.effort -> locomotive.effort", "locomotive.wheel_speed -> odometer.wheel_speed"]
+    data["connections"] = [
+        "driver.effort -> locomotive.effort",
+        "locomotive.wheel_speed -> odometer.wheel_speed",
+        "locomotive.speed -> driver.odometer",
+    ]
     parts = find_parts(Scenario(**data))
     assert {signal: link[0] for signal, link in parts.template.items()} == {
         "effort": "driver.effort",

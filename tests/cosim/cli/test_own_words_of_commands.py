@@ -26,7 +26,7 @@ STEPPING = {
     "sweep": "sweep BAD --vary step=0.1,0.05 --out OUT",
     "tune": "tune BAD --parameters boiler.gain=0.5:2 --cost rms(boiler.y) --iterations 1 --out OUT",
     "calibrate": "calibrate BAD RESULTS --parameters boiler.gain=1.5",
-    "benchmark-observers": "benchmark-observers TRAIN --observers {file}:PlainSpeed",
+    "choose": "choose TRAIN --observers {file}:PlainSpeed",
     "baseline make": "baseline make BAD OUT",
     "baseline check": "baseline check BASELINE",
     "baseline update": "baseline update BASELINE",
@@ -81,8 +81,8 @@ def test_every_command_is_examined() -> None:
 def test_what_a_step_raises(what: str, json: bool, files: dict[str, Path], capsys: pytest.CaptureFixture[str]) -> None:
     text = reported(STEPPING[what], files, capsys, *(["--json"] if json else []))
     assert WORDS in text
-    assert "t = 0.3 s" in text if what == "benchmark-observers" else ALONE in text
-    assert ("PlainSpeed" if what == "benchmark-observers" else "boiler") in text
+    assert "t = 0.3 s" in text if what == "choose" else ALONE in text
+    assert ("PlainSpeed" if what == "choose" else "boiler") in text
     assert "smaller communication step" not in text
 
 

@@ -1,0 +1,201 @@
+"""The answer to which observer: rows in order and in groups, as text, data, lines for a scenario, and a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from cosim.choice.allowance import Allowance
+from cosim.choice.benchmark import ObserverBenchmark
+from cosim.choice.candidates import with_candidate
+from cosim.choice.disturbances import Disturbance
+from cosim.choice.playback import connection
+from cosim.choice.ranking import Row
+from cosim.errors import RunError
+from cosim.simulation.scenario import Scenario
+from fmus.tables.numbers import number
+from fmus.tables.plain_data import jsonable
+from fmus.tables.table import Column, Parts, Readable, Table, error_column, name_column, text_column
+
+PLAIN = "odometer_reset"
+"""What every observer has to beat."""
+_SHOWN = 8
+"""How many of the best a page draws, beside the plain odometer."""
+_SHARE = Column("share", "of allowance", "%", "Largest share of the allowance in all runs that count", factor=100.0)
+_HARDER = Column("harder", "harder", "%", "The same in harder runs, which do not count", factor=100.0)
+_RMS = error_column("rms_position_error", "rms p", "m", "Position error over all runs that count")
+_SPEED = error_column("rms_speed_error", "rms v", "m/s", "Speed error of the nominal run")
+_COST = Column("cost", "cost", "us/step", "Time in the observer per communication step", factor=1e6)
+_BECAUSE = text_column("because", "because")
+_NAME = name_column("observer", "observer")
+
+
+@dataclass(frozen=True)
+class Choice(Readable):
+    """Observers beside several disturbed runs of one plant.
+
+    Args:
+        scenario: that was played. rows: of the observers, the best first. benchmark: of the nominal run.
+        disturbances: of the runs that count and of the harder ones. allowance: what a position may be off.
+        interrupted: whether somebody stopped it; fewer runs count then.
+    """
+
+    scenario: Scenario
+    rows: Sequence[Row]
+    benchmark: ObserverBenchmark
+    disturbances: Sequence[Disturbance]
+    allowance: Allowance
+    interrupted: bool = False
+
+    @property
+    def found(self) -> bool:
+        """Whether any observer came through."""
+        return bool(self.rows) and isfinite(self.rows[0].share)
+
+    @property
+    def best(self) -> Row:
+        """The observer to use, or the least bad one.
+
+        Raises:
+            RunError: none came through.
+        """
+        if not self.found:
+            raise RunError(f"{self.scenario.where}: {self.answer}")
+        return self.rows[0]
+
+    @property
+    def answer(self) -> str:
+        """The answer in a line."""
+        if not self.found:
+            return "no observer came through. " + "; ".join(f"{row.label}: {row.why_not()}" for row in self.rows)
+        best = self.best
+        if best.safe:
+            text = f"use {best.label}" + ("" if best.certified else " (nothing certifies it for these gaps)")
+        else:
+            text = f"nothing is safe here, least bad {best.label}, because of {best.why_not(self._acting(best))}"
+        return f"{text}: {self._numbers(best)}"
+
+    @property
+    def groups(self) -> dict[str, list[Row]]:
+        """Rows by what they are good for."""
+        tried = [row for row in self.rows if row.tried]
+        return {
+            "use": [row for row in tried if row.safe and row.certified],
+            "works but not certified": [row for row in tried if row.safe and not row.certified],
+            "not for your gaps or sensors": [row for row in tried if not row.safe],
+            "not tried": [row for row in self.rows if not row.tried],
+        }
+
+    def parts(self) -> Parts:
+        """The answer, the plain odometer beside it, the groups, what was done, and the lines for a scenario."""
+        if not self.found:
+            return [self.answer, *self.tables()]
+        return [self._first(), *self.tables(), self._done(), self.lines()]
+
+    def tables(self) -> list[Table]:
+        """A table for each group."""
+        use, works, bad, left = self.groups.items()
+        tables = [Table(key.replace(" ", "_"), _GOOD, [_good(r) for r in rows], key) for key, rows in (use, works)]
+        rows = [[r.label, r.share if isfinite(r.share) else None, r.why_not(self._acting(r))] for r in bad[1]]
+        tables.append(Table("not_for", [_NAME, _SHARE, _BECAUSE], rows, f"{bad[0]}, because"))
+        misfits = [[row.label, row.why_not()] for row in left[1]]
+        return [*tables, Table("not_tried", [_NAME, _BECAUSE], misfits, left[0])]
+
+    def lines(self) -> str:
+        """The best observer as lines of a scenario."""
+        candidate, name = self.best.candidate, "observer"
+        table = candidate.table.model_dump(by_alias=True, exclude_unset=True)
+        links = [connection(link, f"{name}.{signal}") for signal, link in candidate.sources.items()]
+        text = tomli_w.dumps({"components": {name: table}})
+        return f"# into connections = [...]: {', '.join(map(repr, links))}\n{text}".rstrip()
+
+    def with_best(self) -> Scenario:
+        """The scenario with the best observer, on which its report is.
+
+        Raises:
+            CosimError: the scenario cannot be changed.
+        """
+        return with_candidate(self.scenario, self.best.candidate)
+
+    def to_data(self) -> dict[str, Any]:
+        """Plain data."""
+        best = self.rows[0] if self.found else None
+        return {
+            "answer": self.answer,
+            "use": None if best is None else best.label,
+            "safe": best is not None and best.safe,
+            "certified": best is not None and best.certified,
+            "allowance": self.allowance.text,
+            "runs": [jsonable(disturbance) for disturbance in self.disturbances],
+            "groups": {group: [row.label for row in rows] for group, rows in self.groups.items()},
+            "rows": [self._row_data(row) for row in self.rows],
+            "toml": self.lines() if self.found else None,
+            "benchmark": self.benchmark.to_data(),
+        }
+
+    def write(self, directory: str | Path) -> dict[str, Path]:
+        """Write page and data to a folder.
+
+        Args:
+            directory: the folder; created where it does not exist.
+
+        Raises:
+            OutputError: the folder cannot be written.
+        """
+        from cosim.report.page.observer_page import Answer, write_benchmark  # noqa: PLC0415 - for those who write
+
+        labels = {PLAIN, *(row.label for row in self.rows[:_SHOWN])}
+        shown = replace(self.benchmark, scores=tuple(s for s in self.benchmark.scores if s.label in labels))
+        good = self.found and self.best.safe
+        return write_benchmark(shown, directory, Answer(self.answer, good, self.tables(), self.to_data()))
+
+    def _first(self) -> str:
+        plain = next((row for row in self.rows if row.candidate.model == PLAIN and row.tried), None)
+        if plain is None or plain is self.best:
+            return self.answer
+        return f"{self.answer}\n{PLAIN}, the odometer alone: {self._numbers(plain)}"
+
+    def _numbers(self, row: Row) -> str:
+        speed = row.score.speed_rms
+        said = f"at most {number(100.0 * row.share)} % of the allowance" if isfinite(row.share) else "diverged"
+        return f"{said}, rms {number(row.rms)} m" + ("" if speed is None else f", nominal {number(speed)} m/s")
+
+    def _acting(self, row: Row) -> dict[str, str]:
+        run, used = row.worst
+        return {d.name: d.cause(used.time) for d in self.disturbances if d.name == run}
+
+    def _done(self) -> str:
+        names = ", ".join(disturbance.name for disturbance in self.disturbances)
+        tried = [row for row in self.rows if row.tried]
+        stopped = " Interrupted: the other runs are missing." if self.interrupted else ""
+        return (
+            f"{len(tried)} observers on {names} of {self.benchmark.spec.title}. Allowance: {self.allowance.text}. "
+            f"Harder runs do not count.{stopped}\n{self.best.label}: {' '.join(self.best.candidate.settings)}"
+        )
+
+    def _row_data(self, row: Row) -> dict[str, Any]:
+        return {
+            "observer": row.label,
+            "safe": row.safe,
+            "certified": row.certified,
+            "share": row.share,
+            "rms_position_error": row.rms,
+            "because": row.why_not(self._acting(row)),
+            "used": jsonable(row.used),
+            "harder": jsonable(row.harder),
+            "failures": dict(row.failures),
+        }
+
+
+_GOOD = (_NAME, _SHARE, _HARDER, _RMS, _SPEED, _COST)
+
+
+def _good(row: Row) -> list[Any]:
+    harder = max((used.share for used in row.harder.values()), default=None)
+    cost = row.score.cost
+    return [row.label, row.share, harder, row.rms, row.score.speed_rms, None if cost is None else 1e-6 * cost]

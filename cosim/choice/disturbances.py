@@ -1,0 +1,163 @@
+"""Disturbances of a choice: what observers believe wrongly of the train, and what is wrong with what they hear.
+
+The plant stays as it is, so that sealed FMUs and recordings are disturbed like any other train: a slope is an effort
+that moves nothing, a wrong mass is one in the observer, faults act on the odometer's reading. Runs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+GRAVITY = 9.81  # [m/s2]
+_BRAKES, _PULLS = -0.1, -0.02  # accelerations below and above which a train brakes or pulls [m/s2]
+_MOVES = 2.0  # [m/s]: below this speed no fault is drawn
+_APART = 5.0  # least time between two faults [s]
+_MOST = 4  # faults of a kind in a run
+_SIGNS = ((1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))
+"""Of the errors of mass, resistance and wheel, for one seed after the other."""
+
+
+@dataclass(frozen=True)
+class Journey:
+    """Where a train was, from its recorded run.
+
+    Args:
+        time: of the rows [s], shape (rows,). position: [m]. speed: [m/s].
+    """
+
+    time: np.ndarray
+    position: np.ndarray
+    speed: np.ndarray
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A wheel that jams or skids.
+
+    Args:
+        onset: [s]. length: [s]. depth: share of the speed that is missing or too much [1]. kind: -1 jam, 1 skid.
+    """
+
+    onset: float
+    length: float
+    depth: float
+    kind: float
+
+
+@dataclass(frozen=True)
+class Slope:
+    """A stretch of the way with a gradient.
+
+    Args:
+        onset: when the train reaches it [s]. length: how long it is on it [s]. gradient: uphill positive [1].
+    """
+
+    onset: float
+    length: float
+    gradient: float
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What is wrong in one run of a choice; as it stands nothing.
+
+    Args:
+        name: for people. mass, resistance: what observers believe, as a share of what is right [1].
+        wheel: what the odometer reads, as a share of what is right [1]. noise: of a reading, standard deviation [m/s].
+        loss: share of the packets that is lost besides [1]. slopes: that nobody knows. faults: of the wheel.
+    """
+
+    name: str = "nominal"
+    mass: float = 1.0
+    resistance: float = 1.0
+    wheel: float = 1.0
+    noise: float = 0.0
+    loss: float = 0.0
+    slopes: Sequence[Slope] = ()
+    faults: Sequence[Fault] = ()
+
+    def cause(self, time: float) -> str:
+        """What acts at an instant [s], in words.
+
+        Args:
+            time: [s].
+        """
+        for fault in self.faults:
+            if fault.onset <= time <= fault.onset + fault.length + _APART:
+                return f"after a wheel that {'jams' if fault.kind < 0.0 else 'skids'} at {fault.onset:.0f} s"
+        for slope in self.slopes:
+            if slope.onset <= time <= slope.onset + slope.length and self.mass != 1.0:
+                share = f"{100.0 * abs(self.mass - 1.0):.0f} % too {'much' if self.mass > 1.0 else 'little'} mass"
+                return f"on an unknown slope of {1e3 * slope.gradient:+.1f} per mille, with {share}"
+        return ""
+
+
+def drawn(number: int, seed: int, journey: Journey, size: float = 1.0) -> Disturbance:
+    """A disturbance from a seed.
+
+    Mass is wrong by 5 to 20 %, resistance by 10 to 50 %, the wheel by 0.3 to 1 %; readings have a noise of 0.02 to
+    0.1 m/s; slopes go up to 8 per mille; a network loses 5 to 20 % more; wheels jam while the train brakes (depth 0.3
+    to 1) and skid while it pulls (0.1 to 0.5), for 0.5 to 3 s. Signs follow from the number, so that four seeds have
+    both of each.
+
+    Args:
+        number: of the seed, from 1. seed: of the run. journey: of the train. size: factor of all of it.
+    """
+    rng = np.random.default_rng((seed, number))
+    mass, resistance, wheel = _SIGNS[(number - 1) % len(_SIGNS)]
+    return Disturbance(
+        name=f"seed {number}" if size == 1.0 else f"harder {number}",
+        mass=1.0 + size * mass * rng.uniform(0.05, 0.2),
+        resistance=1.0 + min(size, 1.8) * resistance * rng.uniform(0.1, 0.5),
+        wheel=1.0 + size * wheel * rng.uniform(0.003, 0.01),
+        noise=size * rng.uniform(0.02, 0.1),
+        loss=size * rng.uniform(0.05, 0.2),
+        slopes=_slopes(rng, journey, size),
+        faults=_faults(rng, journey, size),
+    )
+
+
+def _slopes(rng: np.random.Generator, journey: Journey, size: float) -> list[Slope]:
+    """Stretches of a tenth to a third of the way, at most 2 km, each with a gradient of its own."""
+    way = np.maximum.accumulate(journey.position) - journey.position[0]
+    edges = [0.0]
+    while edges[-1] < way[-1] and len(edges) <= 2 * _MOST:
+        edges.append(edges[-1] + min(rng.uniform(0.1, 0.33) * way[-1], rng.uniform(500.0, 2000.0)))
+    reached = [float(journey.time[min(int(np.searchsorted(way, edge)), len(way) - 1)]) for edge in edges]
+    reached[-1] = float(journey.time[-1])
+    gradients = size * 8e-3 * rng.uniform(-1.0, 1.0, len(edges))
+    pairs = zip(reached, reached[1:], gradients, strict=False)
+    return [Slope(a, b - a, float(gradient)) for a, b, gradient in pairs if b > a]
+
+
+def _faults(rng: np.random.Generator, journey: Journey, size: float) -> list[Fault]:
+    """Jams while the train brakes, skids while it pulls, in the order of time and apart from each other."""
+    moving = journey.speed > _MOVES
+    pace = _accelerations(journey)
+    jams = _instants(rng, journey.time[moving & (pace < _BRAKES)], every=15.0)
+    skids = _instants(rng, journey.time[moving & (pace > _PULLS)], every=40.0)
+    found: list[Fault] = []
+    for onset, kind in sorted([(t, -1.0) for t in jams] + [(t, 1.0) for t in skids]):
+        depth = rng.uniform(0.3, 1.0) if kind < 0.0 else min(size * rng.uniform(0.1, 0.5), 1.0)
+        length = size * rng.uniform(0.5, 3.0)
+        if not found or onset > found[-1].onset + found[-1].length + _APART:
+            found.append(Fault(onset, float(length), float(depth), kind))
+    return found
+
+
+def _accelerations(journey: Journey) -> np.ndarray:
+    """Mean acceleration over the second around each row [m/s2], shape (rows,)."""
+    before, after = (np.interp(journey.time + shift, journey.time, journey.speed) for shift in (-0.5, 0.5))
+    return np.asarray(after - before)
+
+
+def _instants(rng: np.random.Generator, times: np.ndarray, every: float) -> list[float]:
+    """Instants drawn from those of the rows [s]; one for each `every` seconds that these take, at least one."""
+    if not len(times):
+        return []
+    seconds = len(times) * float(np.median(np.diff(times, append=times[-1] + every)))
+    count = int(np.clip(round(seconds / every), 1, _MOST))
+    return [float(t) for t in rng.choice(times, count)]

@@ -1,0 +1,124 @@
+"""A disturbance in a scenario that plays a recording back: fault blocks between the recording and the observers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from cosim.choice.candidates import BenchmarkCandidate
+from cosim.choice.disturbances import GRAVITY, Disturbance, Fault
+from cosim.choice.known_parameters import DAVIS, MASS, Known
+from cosim.choice.playback import ScenarioParts
+from cosim.run.component_models import make_system, values_in_use
+
+_EFFORT, _WHEEL, _ODOMETER = "disturbed_effort", "disturbed_wheel", "disturbed_odometer"
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What a signal passes between the recording and the observers.
+
+    Args:
+        source: the recorded signal. output: what observers hear in its place. components: tables by name.
+        connections: from the source to the output.
+    """
+
+    source: str
+    output: str
+    components: Mapping[str, Mapping[str, Any]]
+    connections: Sequence[Any]
+
+
+def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> list[Channel]:
+    """The disturbed channels: effort and odometer, as far as there are such signals and something is wrong with them.
+
+    Args:
+        disturbance: what is wrong. parts: of the scenario. known: of the train.
+    """
+    found = []
+    if disturbance.slopes and "effort" in parts.template:
+        mass = known[MASS][0] if MASS in known else 1.0
+        found.append(_effort_channel(parts.template["effort"][0], disturbance, mass))
+    if "odometer" in parts.template and (disturbance.faults or disturbance.noise or disturbance.wheel != 1.0):
+        period = known["odometer_period"][0] if "odometer_period" in known else parts.table.step
+        found.append(_odometer_channel(parts.template["odometer"][0], disturbance, period))
+    return found
+
+
+def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> Channel:
+    """On a slope a train of the same motion needs ``m g i`` more."""
+    slopes = disturbance.slopes
+    given = {
+        "fault_onset": [slope.onset for slope in slopes],
+        "fault_length": [slope.length for slope in slopes],
+        "fault_offset": [mass * GRAVITY * slope.gradient for slope in slopes],
+    }
+    options = {"fault_count": len(slopes), "unit": "N"}
+    table = {"model": "signal_fault", "options": options, "parameters": given}
+    return Channel(source, f"{_EFFORT}.reading", {_EFFORT: table}, [f"{source} -> {_EFFORT}.healthy"])
+
+
+def _odometer_channel(source: str, disturbance: Disturbance, period: float) -> Channel:
+    """A wheel that jams and skids, and an odometer that is worn and noisy."""
+    faults = disturbance.faults or (Fault(0.0, 0.0, 0.0, -1.0),)
+    given = {f"fault_{key}": [getattr(fault, key) for fault in faults] for key in ("onset", "length", "depth", "kind")}
+    wheel = {"model": "wheel_fault", "options": {"cause": "given", "fault_count": len(faults)}, "parameters": given}
+    odometer = {"model": "odometer", "parameters": {"sample_period": period, "noise_std": disturbance.noise}}
+    lines = [
+        {"from": source, "to": f"{_WHEEL}.speed", "factor": disturbance.wheel},
+        f"{_WHEEL}.wheel_speed -> {_ODOMETER}.wheel_speed",
+    ]
+    return Channel(source, f"{_ODOMETER}.reading", {_WHEEL: wheel, _ODOMETER: odometer}, lines)
+
+
+def disturbed(data: dict[str, Any], found: Sequence[Channel], disturbance: Disturbance) -> dict[str, Any]:
+    """The tables of a scenario with the channels in it.
+
+    Args:
+        data: tables that play a recording back. found: the channels. disturbance: what is wrong.
+    """
+    heard = {channel.source: channel.output for channel in found}
+    changed = dict(data)
+    changed["components"] = data["components"] | {n: dict(t) for c in found for n, t in c.components.items()}
+    changed["connections"] = [
+        *(_moved(line, heard) for line in data["connections"]),
+        *(x for c in found for x in c.connections),
+    ]
+    if "network" in data:
+        network = data["network"]
+        nodes = {node: [heard.get(name, name) for name in names] for node, names in network["nodes"].items()}
+        scales = {heard.get(name, name): value for name, value in network.get("scales", {}).items()}
+        loss = min(network.get("loss_fraction", 0.0) + disturbance.loss, 0.9)
+        changed["network"] = network | {"nodes": nodes, "scales": scales, "loss_fraction": loss}
+    return changed
+
+
+def _moved(line: str | dict[str, Any], heard: Mapping[str, str]) -> str | dict[str, Any]:
+    """A connection from what observers hear in place of the recorded signal."""
+    if isinstance(line, dict):
+        return line | {"from": heard.get(line["from"], line["from"])}
+    source, arrow, target = line.partition(" -> ")
+    return heard.get(source, source) + arrow + target
+
+
+def believing(candidate: BenchmarkCandidate, disturbance: Disturbance) -> BenchmarkCandidate:
+    """An observer that believes in another mass and resistance; one that knows neither as it is.
+
+    Args:
+        candidate: the observer. disturbance: what it believes wrongly.
+    """
+    table = candidate.table
+    system = None if table.observer is None else make_system(table, candidate.name)
+    if system is None:
+        known: Mapping[str, Any] = table.parameters
+    else:
+        scalars = {signal.name for signal in system.parameter_signals if signal.size is None}
+        values = values_in_use(table, system)
+        known = {name: float(getattr(values, name)) for name in (MASS, *DAVIS) if name in scalars}
+    shares = {MASS: disturbance.mass, **dict.fromkeys(DAVIS, disturbance.resistance)}
+    changed = {
+        n: share * known[n] for n, share in shares.items() if share != 1.0 and isinstance(known.get(n), int | float)
+    }
+    parameters = {**table.parameters, **changed}
+    return replace(candidate, table=table.model_copy(update={"parameters": parameters}))

@@ -1,0 +1,221 @@
+"""What an observer can know of the train in a scenario: what the scenario says, and what a recorded run of it shows.
+
+Runs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cosim.choice.playback import ScenarioParts
+from cosim.evaluation.roles import recorded
+from cosim.results.result import Result
+from cosim.run.component_models import make_declared, make_system, values_in_use
+from cosim.scenario.scenario_tables import ComponentTable
+from cosim.simulation.scenario import Scenario
+from cosim.starter.inspected_fmu import inspect_fmu
+from cosim.starter.starter_roles import PlantRoles, plant_roles
+from plant_models.hybrid import Signal
+
+Known = Mapping[str, tuple[float, str]]
+"""Values by the name of a parameter, and who says so."""
+
+MASS, DAVIS = "mass", ("davis_a", "davis_b", "davis_c")
+_START_POSITION = ("estimated_position", "predicted_position")
+_START_SPEED = ("estimated_speed", "odometer_speed", "held_speed")
+_OF_THE_TRAIN = (MASS, *DAVIS, "wheel_radius", "wheel_inertia", "n_axles", "brake_coefficient")
+_PERIOD, _SPACING = "odometer_period", "expected_spacing"
+SHARED_PARAMETERS = (*_OF_THE_TRAIN, *_START_POSITION, *_START_SPEED, _PERIOD, _SPACING)
+"""What train observers want to know of the train, of its odometer and balises, and where they believe it to start."""
+
+_RESISTANCE = (0.01, 3.6e-4, 1.8365e-5)
+"""Davis coefficients by mass [N/kg], [N.s/(m.kg)], [N.s2/(m2.kg)]: those of the locomotive that ships."""
+_MOVING = 0.5  # [m/s]: from here on a run says something of mass
+
+
+def settable(system: Any) -> tuple[Signal, ...]:
+    """What a component's table may say to a model: its parameters and, of a hybrid system, its states at the start.
+
+    Args:
+        system: a hybrid system, or a model of plain Python.
+    """
+    return (*system.parameter_signals, *getattr(system, "states", ()))
+
+
+def stated_parameters(scenario: Scenario, parts: ScenarioParts) -> dict[str, tuple[float, str]]:
+    """What the scenario says of the train that an observer should know too.
+
+    What its own observers, as far as they want to know it, agree on comes first; then parameters, preset and defaults
+    of the plant, or the start values of its FMU; then the period of the declared odometer.
+
+    Args:
+        scenario: for paths. parts: of it.
+    """
+    found = _agreed(parts)
+    if parts.train:
+        plant = parts.table.components[parts.train]
+        for name, value in _plant_values(scenario, plant).items():
+            found.setdefault(name, (value, f"as for {parts.train}"))
+    period = _declared_period(parts)
+    if period is not None:
+        found.setdefault(_PERIOD, (period, "of the odometer"))
+    return found
+
+
+def derived_parameters(known: Known, parts: ScenarioParts, run: Result) -> dict[str, tuple[float, str]]:
+    """What is known, and what a recorded run shows besides: the start, the spacing of balises, the period of the
+    odometer, and, where nobody states them, mass and resistance of the train.
+
+    Args:
+        known: by the scenario. parts: of it. run: its recorded run.
+    """
+    found = dict(known)
+    position, speed = (recorded(run, name) for name in true_signals(parts))
+    for names, values in ((_START_POSITION, position), (_START_SPEED, speed)):
+        if values is not None and len(values):
+            found |= {n: (float(values[0]), "start of the recorded run") for n in names if n not in found}
+    spacing = _seen_spacing(run)
+    if spacing is not None:
+        found.setdefault(_SPACING, (spacing, "median of the recorded run"))
+    period = _seen_period(run, parts.template["odometer"][0]) if "odometer" in parts.template else None
+    if period is not None:
+        found.setdefault(_PERIOD, (period, "changes in the recorded run"))
+    if MASS not in found and speed is not None and "effort" in parts.template:
+        mass = _fitted_mass(run.time, speed, recorded(run, parts.template["effort"][0]))
+        if mass is not None:
+            found[MASS] = mass, "fitted to effort and speed of the recorded run; check it"
+    if MASS in found:
+        by_mass = {
+            n: (share * found[MASS][0], "usual for this mass") for n, share in zip(DAVIS, _RESISTANCE, strict=True)
+        }
+        found = by_mass | found
+    return found
+
+
+# -- what the scenario says -------------------------------------------------------------------------------------------
+
+
+def _agreed(parts: ScenarioParts) -> dict[str, tuple[float, str]]:
+    """What the scenario's own observers agree on, as far as they want to know it."""
+    found: dict[str, tuple[float, str]] = {}
+    tables = [parts.table.components[name] for name in parts.observers]
+    settables = [
+        set(SHARED_PARAMETERS) if t.observer is None else {s.name for s in settable(make_declared(t, ""))}
+        for t in tables
+    ]
+    for parameter in SHARED_PARAMETERS:
+        wanting = [table for table, known in zip(tables, settables, strict=True) if parameter in known]
+        stated = [table.parameters.get(parameter) for table in wanting]
+        values = {value for value in stated if isinstance(value, int | float) and not isinstance(value, bool)}
+        if len(values) == 1 and None not in stated:
+            found[parameter] = float(values.pop()), "as for the observers of the scenario"
+    return found
+
+
+def _plant_values(scenario: Scenario, table: ComponentTable) -> dict[str, float]:
+    """Parameters of a plant that an observer has too, with their defaults."""
+    if table.fmu is not None:
+        return _fmu_values(scenario, table)
+    system = make_system(table, "")
+    if system is None:
+        return {n: float(v) for n in _OF_THE_TRAIN if isinstance(v := table.parameters.get(n), int | float)}
+    values = values_in_use(table, system)
+    scalars = {signal.name for signal in system.parameter_signals if signal.size is None}
+    return {name: float(getattr(values, name)) for name in _OF_THE_TRAIN if name in scalars}
+
+
+def _fmu_values(scenario: Scenario, table: ComponentTable) -> dict[str, float]:
+    """The same of an FMU: parameters of these names, and the mass by what it is called; set, or start values."""
+    inspected = inspect_fmu((scenario.folder / str(table.fmu)).resolve())
+    signals = {signal.name: signal for signal in inspected.parameters}
+    named = {name: signals[name] for name in _OF_THE_TRAIN if name in signals}
+    mass = plant_roles(inspected).mass
+    if mass is not None and mass.signal.readable:
+        named.setdefault(MASS, mass.signal)
+    found = {}
+    for name, signal in named.items():
+        value = table.parameters.get(signal.name, signal.start)
+        if isinstance(value, int | float):
+            found[name] = float(value) * (1.0 if signal.meaning is None else signal.meaning.factor)
+    return {name: value for name, value in found.items() if name != MASS or value > 0.0}
+
+
+def _declared_period(parts: ScenarioParts) -> float | None:
+    """Time between two readings of the declared odometer [s], or between two packets; None where a model says none."""
+    network, source = parts.table.network, parts.odometer
+    if source is None:
+        return None
+    if network is not None and network.period is not None and any(source in n for n in network.nodes.values()):
+        return network.period
+    table = parts.table.components.get(source.partition(".")[0])
+    system = None if table is None or table.model is None else make_system(table, "")
+    if table is None or system is None:
+        return None
+    values = values_in_use(table, system)
+    periods = [float(getattr(values, event.period)) for event in system.periodic_events]
+    return min(periods, default=None)
+
+
+def fmu_roles(scenario: Scenario, parts: ScenarioParts) -> PlantRoles | None:
+    """What the signals of the train's FMU are; None where the train is none.
+
+    Args:
+        scenario: for paths. parts: of it.
+    """
+    fmu = parts.table.components[parts.train].fmu if parts.train else None
+    return None if fmu is None else plant_roles(inspect_fmu((scenario.folder / fmu).resolve()))
+
+
+# -- what a run shows -------------------------------------------------------------------------------------------------
+
+
+def true_signals(parts: ScenarioParts) -> tuple[str | None, str | None]:
+    """Names of the true position and speed; None for what nobody names.
+
+    Args:
+        parts: of a scenario.
+    """
+    balises, report = parts.table.balises, parts.table.report
+    position, speed = (None, None) if balises is None else (balises.position, balises.speed)
+    return report.true_position or position, report.true_speed or speed
+
+
+def _seen_spacing(run: Result) -> float | None:
+    """Median way between two balises [m]; None with fewer than two."""
+    places = sorted({event.position for event in run.events if event.kind == "true"})
+    return float(np.median(np.diff(places))) if len(places) > 1 else None
+
+
+def _seen_period(run: Result, name: str) -> float | None:
+    """Median time between two changes of a reading [s]; None where it hardly changes."""
+    values = recorded(run, name)
+    if values is None:
+        return None
+    changes = run.time[1:][np.diff(values) != 0.0]
+    return round(float(np.median(np.diff(changes))), 9) if len(changes) > 2 else None
+
+
+def _fitted_mass(time: np.ndarray, speed: np.ndarray, effort: np.ndarray | None) -> float | None:
+    """Mass with which efforts and speeds go together, with the resistance that is usual for it [kg]; None for none.
+
+    ``F = M (dv/dt + a + b v + c v^2)`` by least squares, with the acceleration over a second.
+
+    Args:
+        time: of the rows [s], shape (rows,). speed: [m/s]. effort: [N].
+    """
+    if effort is None or len(time) < 3:
+        return None
+    grid = np.arange(time[0], time[-1], 1.0)
+    if len(grid) < 3:
+        return None
+    way = np.interp(grid, time, np.concatenate(([0.0], np.cumsum(effort[:-1] * np.diff(time)))))
+    v = np.interp(grid, time, speed)
+    push, mean = np.diff(way), 0.5 * (v[1:] + v[:-1])
+    per_mass = np.diff(v) + sum(share * mean**power for power, share in enumerate(_RESISTANCE))
+    moving = mean > _MOVING
+    weight = float(np.sum(per_mass[moving] ** 2))
+    mass = float(np.sum(push[moving] * per_mass[moving]) / weight) if weight > 0.0 else 0.0
+    return float(f"{mass:.3g}") if np.isfinite(mass) and mass > 0.0 else None

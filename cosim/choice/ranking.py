@@ -1,0 +1,130 @@
+"""The order of observers over several disturbed runs: safe ones first, then by the error of the position."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, isfinite, sqrt
+
+from cosim.choice.allowance import UsedAllowance
+from cosim.choice.candidates import BenchmarkCandidate
+from cosim.choice.observer_scores import SEEN_GAP, ObserverScore
+from fmus.tables.numbers import number
+
+TIE = 0.1
+"""Share of the allowance below which two observers do not differ [1]."""
+_NOTHING = UsedAllowance(inf, 0.0, inf, inf)
+
+
+@dataclass(frozen=True)
+class Row:
+    """An observer in a choice.
+
+    Args:
+        score: of the nominal run. candidate: how it is set. used: of the allowance, by the name of the run; those that
+            count. harder: of the allowance in runs that do not.
+        failures: why it failed, by the name of the run.
+    """
+
+    score: ObserverScore
+    candidate: BenchmarkCandidate
+    used: Mapping[str, UsedAllowance]
+    harder: Mapping[str, UsedAllowance] = field(default_factory=dict)
+    failures: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        """To show."""
+        return self.score.label
+
+    @property
+    def tried(self) -> bool:
+        """Whether it ran at all."""
+        return bool(self.used)
+
+    @property
+    def worst(self) -> tuple[str, UsedAllowance]:
+        """The run in which it uses most of the allowance, and how much; one that fails uses more than there is."""
+        if not self.used:
+            return "", _NOTHING
+        failed = {name: _NOTHING for name in self.failures if name in self.used}
+        every = {**self.used, **failed}
+        name = max(every, key=lambda name: every[name].share)
+        return name, every[name]
+
+    @property
+    def share(self) -> float:
+        """The largest share of the allowance that it uses [1]."""
+        return self.worst[1].share
+
+    @property
+    def safe(self) -> bool:
+        """Whether it stays within the allowance in all runs that count."""
+        return self.share <= 1.0
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the position error over all runs that count [m]."""
+        found = [inf if name in self.failures else used.rms for name, used in self.used.items()]
+        return sqrt(sum(e**2 for e in found) / len(found)) if found and all(e < 1e150 for e in found) else inf
+
+    @property
+    def certified(self) -> bool:
+        """Whether its gains are certified for the gaps expected, or, where these are not known, for those seen."""
+        gap = self.score.certificate
+        if gap is None:
+            return False
+        return bool(gap.condition(SEEN_GAP).holds) if gap.holds is None else gap.holds
+
+    def why_not(self, causes: Mapping[str, str] | None = None) -> str:
+        """Why it is none to be used, in words; empty where it is safe.
+
+        Args:
+            causes: what acted when it was worst, by the name of the run.
+        """
+        if not self.tried:
+            return str(self.score.failure or "")
+        gap = self.score.certificate
+        reasons = []
+        if gap is not None and not self.certified and isfinite(gap.value):
+            seen = max(g for g in (gap.demand, gap.condition(SEEN_GAP).value, 0.0) if g is not None and g == g)  # noqa: PLR0124 - NaN
+            reasons += [f"its gains are certified for gaps up to {number(gap.value)} s, here are {number(seen)} s"]
+        run, used = self.worst
+        if self.failures:
+            reasons += [next(iter(self.failures.values()))]
+        elif not self.safe:
+            acting = (causes or {}).get(run, "")
+            text = f"{number(used.share)} times the allowance in {run} at {used.time:.0f} s"
+            reasons += [f"{text}, {acting}" if acting else text]
+        return "; ".join(reasons) if not self.safe else ""
+
+
+def ranked(rows: Sequence[Row]) -> list[Row]:
+    """The rows in order, the best first.
+
+    Safe ones come before all others. Of safe ones those whose errors differ from the smallest by less than `TIE` of
+    the allowance are as good, and certified ones of them come first; else the error decides, and of unsafe ones the
+    share of the allowance.
+
+    Args:
+        rows: in any order.
+    """
+    tried = [row for row in rows if row.tried]
+    limit = min((row.rms for row in tried if row.safe), default=inf) + TIE * allowed(tried)
+
+    def place(row: Row) -> tuple[float, ...]:
+        if not row.safe:
+            return 2.0, row.share, row.rms
+        return (0.0, not row.certified, row.rms) if row.rms <= limit else (1.0, row.rms)
+
+    return [*sorted(tried, key=place), *(row for row in rows if not row.tried)]
+
+
+def allowed(rows: Sequence[Row]) -> float:
+    """Root mean square of the allowance over the runs that count [m]; 0 without any.
+
+    Args:
+        rows: of observers that ran.
+    """
+    found = [used.allowed for row in rows for used in row.used.values() if isfinite(used.allowed)]
+    return sqrt(sum(a**2 for a in found) / len(found)) if found else 0.0

@@ -1,0 +1,105 @@
+"""``cosim choose``: which observer to use beside a train, how good it is, and why not the others."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from cosim.choice.allowance import Allowance
+from cosim.choice.choice import Choice
+from cosim.choice.choose import SEEDS, choose, scenario_for_fmu
+from cosim.cli.arguments import QUIET, settings_argument
+from cosim.cli.output import print_warning
+from cosim.cli.scenarios import load_scenario
+from cosim.errors import RunError
+from cosim.results.results_folder import check_writable
+from cosim.simulation.scenario import Scenario
+from fmus.cli.commands import argument, one_of
+from fmus.cli.output import Output
+from fmus.cli.progress import ProgressBar
+
+
+def _names(text: str) -> list[str]:
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
+        raise argparse.ArgumentTypeError("expected names separated by commas")
+    return names
+
+
+GROUP = "Observers"
+PLACE = 1
+HELP = "which observer to use beside a train, how good it is, and why not the others"
+FORMER = {"benchmark-observers": "cosim choose SCENARIO"}
+EXAMPLES = ("cosim choose vendor.fmu", "cosim choose vendor.toml --write chosen.toml")
+PARSER = {
+    "description": (
+        "Run the train of a scenario, or a plant FMU, and play it back to every preset of all train observers side by "
+        "side: as it is, and disturbed with errors of both signs (mass, resistance, slopes, noise, wear, losses, jams "
+        "and skids). First comes what stays within the allowance in all runs, then the smallest position error."
+    ),
+    "epilog": "Exit codes: 0 there is an answer, 2 error or interrupted; what was evaluated is printed.",
+}
+ARGUMENTS = (
+    argument("scenario", metavar="SCENARIO|FMU", help="a shipped scenario, a file (.toml or .ssp), or a plant (.fmu)"),
+    settings_argument(),
+    argument(
+        "--observers",
+        type=_names,
+        metavar="A,B,...",
+        help="components of the scenario, shipped observers, NAME:PRESET or file.py:Class (default: the scenario's "
+        "own, and every preset of all train observers)",
+    ),
+    argument("--seeds", type=int, default=SEEDS, metavar="N", help=f"disturbed runs that count (default: {SEEDS})"),
+    argument(
+        "--allowance",
+        default=None,
+        metavar="M+PERCENT%",
+        help="what a position may be off: metres, plus per cent of the distance since the last balise (default: 5+5%%, "
+        "SUBSET-041)",
+    ),
+    one_of(
+        argument("--record", metavar="DIR", help="keep the nominal run as a results folder"),
+        argument("--from", metavar="DIR", dest="recorded", help="play back this results folder instead of new runs"),
+    ),
+    argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1)"),
+    argument("--write", type=Path, metavar="FILE", help="write the scenario with the observer in it"),
+    argument("--out", metavar="DIR", help="also write page and data to this folder"),
+    QUIET,
+)
+
+
+def execute(options: argparse.Namespace) -> Output:
+    """Choose, and write where the options ask for it."""
+    for folder in (options.out, options.record):
+        if folder is not None:
+            check_writable(folder)
+    with ProgressBar("run", silent=options.quiet or options.json) as bar:
+        choice = _chosen(options, bar)
+    files: dict[str, Path] = {}
+    if options.write is not None and choice.found:
+        files["scenario"] = choice.with_best().save(options.write)
+    if options.out is not None:
+        files |= choice.write(options.out)
+    nothing = None if choice.found else RunError(choice.answer)
+    return Output(choice.parts(), choice.to_data(), files, error=KeyboardInterrupt() if choice.interrupted else nothing)
+
+
+def _chosen(options: argparse.Namespace, bar: ProgressBar) -> Choice:
+    more: dict[str, Any] = {
+        "seeds": options.seeds,
+        "allowance": None if options.allowance is None else Allowance.of(options.allowance),
+        "record": options.record,
+        "recorded": options.recorded,
+        "workers": options.workers,
+        "progress": lambda what, done, total: bar(done, total, what),
+        "warn": print_warning,
+    }
+    return choose(_scenario(options), options.observers, **more)
+
+
+def _scenario(options: argparse.Namespace) -> Scenario:
+    """The scenario that is named, or that of a starter for the FMU that is."""
+    if Path(options.scenario).suffix.lower() == ".fmu":
+        return load_scenario(options, scenario_for_fmu(options.scenario))
+    return load_scenario(options)

@@ -1,0 +1,423 @@
+"""Is the observer that `cosim choose` names the right one? On trains that its rules never saw, beside the truth.
+
+``python docs/studies/choosing.py`` chooses for 20 trains and prints the table of docs/choosing_an_observer.md, with
+``--write`` it puts it there; that takes ten minutes of CPU. ``--first SEED --trains N`` takes others: the rules were
+made with those from 1000 on, and are held against those from 2000 on.
+
+A train is drawn from its seed. What its scenario says is what a user knows: the mass that stands in the papers, the
+spacing of the balises, how late and how often their telegrams come, the noise of the odometer, the loss of the network.
+What it does not say happens on four hidden seeds: the plant has another mass and another resistance, the track has
+slopes, the wheel is worn, it jams and skids. The choice never disturbs a plant, so that nothing is shared but the
+observers. All rows run on all hidden seeds: that is the truth.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from math import inf, isfinite
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+from page_tables import write_table
+
+from cosim import Scenario
+from cosim.choice.benchmark import ObserverBenchmark, benchmark_observers
+from cosim.choice.candidates import with_candidate
+from cosim.choice.choice import Choice
+from cosim.choice.choose import choose
+from cosim.choice.ranking import TIE, Row, allowed, ranked
+from fmus.tables.numbers import number
+
+PAGE = Path(__file__).parents[1] / "choosing_an_observer.md"
+FIRST, TRAINS, HIDDEN = 2000, 20, 4
+STOP, STEP = 150.0, 0.1  # [s]
+WITHIN, CLOSE = 1.2, 1.5  # factors of the smallest error: what a choice must reach, and what makes an exhibit
+GRADIENTS = 8
+THUMBS = ("balise_odometer_ekf", "quasi_lpv_uio:as_published", "takagi_sugeno_cdo:long_gaps", "odometer_reset")
+"""Observers that could be taken always."""
+
+
+@dataclass(frozen=True)
+class Train:
+    """A train with all that its scenario says, and with what it does not.
+
+    Args:
+        seed: that it was drawn from. mass: in the papers [kg]. gap: between balises at top speed [s]. top: [m/s].
+        period: of the odometer [s]. noise: of its readings [m/s]. latency: of telegrams [s]. missed: share of them.
+        loss: share of lost packets; None without a network.
+        mass_error, resistance_error, wear: largest relative error that the papers have [1]. gradient: largest [1].
+        faults: mean number of jams and of skids in a run.
+    """
+
+    seed: int
+    mass: float
+    gap: float
+    top: float
+    period: float
+    noise: float
+    latency: float
+    missed: float
+    loss: float | None
+    mass_error: float
+    resistance_error: float
+    wear: float
+    gradient: float
+    faults: float
+
+    @classmethod
+    def drawn(cls, seed: int) -> Train:
+        """A train from its seed."""
+        rng = np.random.default_rng(seed)
+
+        def log(low: float, high: float) -> float:
+            return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+        def sometimes(share: float, high: float) -> float:
+            return float(rng.uniform(0.0, high)) if rng.uniform() < share else 0.0
+
+        return cls(
+            seed,
+            mass=log(60e3, 2000e3),
+            gap=log(0.3, 199.0),
+            top=float(rng.uniform(12.0, 35.0)),
+            period=float(rng.choice([0.1, 0.2])),
+            noise=sometimes(0.6, 0.1),
+            latency=sometimes(0.5, 0.6),
+            missed=sometimes(0.4, 0.2),
+            loss=float(rng.uniform(0.02, 0.3)) if rng.uniform() < 0.3 else None,
+            mass_error=sometimes(0.8, 0.2),
+            resistance_error=sometimes(0.8, 0.5),
+            wear=sometimes(0.5, 0.01),
+            gradient=sometimes(0.7, 0.01),
+            faults=float(rng.integers(0, 4)),
+        )
+
+    @cached_property
+    def profile(self) -> tuple[list[float], list[float]]:
+        """Instants [s] and speeds [m/s] of its journey: away, perhaps a stop on the way, another speed, a stop."""
+        rng = np.random.default_rng((self.seed, 1))
+        rate, second = rng.uniform(0.25, 0.6), self.top * rng.uniform(0.4, 1.0)
+        low = 0.0 if rng.uniform() < 0.5 else self.top * rng.uniform(0.2, 0.8)
+        legs = (0.0, self.top, self.top, low, low, second, second, 0.0)
+        moving = [abs(b - a) / rate for a, b in pairwise(legs)]
+        rest = max(STOP - 15.0 - sum(moving), 30.0)
+        shares = iter(rng.dirichlet([4.0, 1.0, 4.0]))
+        lengths = [t if t > 0.0 else float(next(shares)) * rest for t in moving]
+        return [0.0, *np.cumsum(lengths).tolist()], [float(v) for v in legs]
+
+    @property
+    def davis(self) -> dict[str, float]:
+        """Running resistance in the papers."""
+        return {"davis_a": 0.02 * self.mass, "davis_b": 6e-4 * self.mass, "davis_c": 1.2e-5 * self.mass}
+
+    def scenario(self) -> Scenario:
+        """What a user knows: train, driver, odometer, balises, perhaps a network; no observer."""
+        made = Scenario(stop=STOP, step=STEP, seed=self.seed, certificates="ignore", title=f"train {self.seed}")
+        own = {"traction_coefficient": 1.0, "brake_coefficient": 1.0, "fitted_to": 200.0}
+        options = {"gradient_count": GRADIENTS}
+        made.add(
+            "train", model="longitudinal_train", options=options, parameters={"mass": self.mass, **self.davis, **own}
+        )
+        follows = {"effort_limit": self.mass, "power_limit": 25.0 * self.mass, "holding_effort": 0.7 * self.mass}
+        gains = {"proportional_gain": 0.8 * self.mass, "integral_gain": 0.1 * self.mass}
+        profile = dict(zip(("profile_time", "profile_speed"), self.profile, strict=True))
+        made.add("driver", model="driver", parameters={**follows, **gains, **profile})
+        made.connect("driver.effort -> train.effort", "train.speed -> driver.odometer")
+        made.add("odometer", model="odometer", parameters={"sample_period": self.period, "noise_std": self.noise})
+        made.connect("train.wheel_speed -> odometer.wheel_speed")
+        if self.loss is not None:
+            made.network(nodes={"odometer": ["odometer.reading"]}, period=self.period, loss_fraction=self.loss)
+        place = {"position": "train.position", "speed": "train.speed", "odometer": "odometer.reading"}
+        late = {"latency": self.latency, "missed_fraction": self.missed}
+        made.balises(layout="spacing", spacing=self.gap * self.top, track_start=0.0, track_end=5e4, **place, **late)
+        return made
+
+    def truth(self, hidden: int) -> Scenario:
+        """What happens on a hidden seed: another mass, resistance and wheel, slopes, jams and skids.
+
+        Args:
+            hidden: number of the seed, from 0.
+        """
+        rng = np.random.default_rng((self.seed, 2, hidden))
+        made = self.scenario().set("seed", 100_000 + 10 * self.seed + hidden)
+        mass, drag, wheel = (
+            1.0 + float(rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.0)) * error
+            for error in (self.mass_error, self.resistance_error, self.wear)
+        )
+        places = np.concatenate(([0.0], np.cumsum(rng.uniform(300.0, 2000.0, GRADIENTS - 1))))
+        made.set("train.mass", mass * self.mass).set("train.gradient_position", places.tolist())
+        made.set("train.gradient", (self.gradient * rng.uniform(-1.0, 1.0, GRADIENTS)).tolist())
+        for name, value in self.davis.items():
+            made.set(f"train.{name}", drag * value)
+        return self._with_wheel(made, rng, wheel)
+
+    def _with_wheel(self, made: Scenario, rng: np.random.Generator, wear: float) -> Scenario:
+        """The wheel between train and odometer, with its faults."""
+        table = made.table().model_dump(by_alias=True, exclude_unset=True)
+        table["connections"] = [c for c in table["connections"] if "odometer.wheel_speed" not in c]
+        table["connections"] += [
+            {"from": "train.wheel_speed", "to": "wheel.speed", "factor": wear},
+            "wheel.wheel_speed -> odometer.wheel_speed",
+        ]
+        table["components"]["wheel"] = {
+            "model": "wheel_fault",
+            "options": {"cause": "given", "fault_count": 16},
+            "parameters": self._faults(rng),
+        }
+        return Scenario(**table)
+
+    def _faults(self, rng: np.random.Generator) -> dict[str, list[float]]:
+        """Jams while the profile falls, skids while it rises: onset, length, depth and kind, in the order of time."""
+        times, speeds = self.profile
+        pieces = list(zip(times, times[1:], np.diff(speeds), strict=False))
+        found: list[tuple[float, float, float, float]] = []
+        for kind, depths in ((-1.0, (0.3, 1.0)), (1.0, (0.1, 0.5))):
+            legs = [(a, b) for a, b, change in pieces if change * kind > 0.0]
+            for _ in range(rng.poisson(self.faults) if legs else 0):
+                a, b = legs[rng.integers(len(legs))]
+                onset = rng.uniform(a + 0.1 * (b - a), b)
+                found.append((float(onset), float(rng.uniform(0.3, 3.0)), float(rng.uniform(*depths)), kind))
+        kept: list[tuple[float, float, float, float]] = []
+        for fault in sorted(found)[:16]:
+            if not kept or fault[0] > kept[-1][0] + kept[-1][1] + 0.1:
+                kept.append(fault)
+        filled = [*kept, *[(0.0, 0.0, 0.0, -1.0)] * (16 - len(kept))]
+        names = ("fault_onset", "fault_length", "fault_depth", "fault_kind")
+        return dict(zip(names, ([float(v) for v in column] for column in zip(*filled, strict=True)), strict=True))
+
+
+def truth_of(train: Train, benchmark: ObserverBenchmark) -> list[Row]:
+    """All rows on all hidden seeds, the best first; each believes what it was played with.
+
+    Args:
+        train: the train. benchmark: the nominal run with what the user knows; what fails there is none to be chosen.
+    """
+    failed = benchmark.failed
+    fitting = [candidate for name, candidate in benchmark.candidates.items() if name not in failed]
+    used: dict[str, dict[str, Any]] = {candidate.name: {} for candidate in fitting}
+    failures: dict[str, dict[str, str]] = {candidate.name: {} for candidate in fitting}
+    scores: dict[str, Any] = {}
+    for hidden in range(HIDDEN):
+        scenario = train.truth(hidden)
+        for candidate in fitting:
+            scenario = with_candidate(scenario, candidate)
+        for score in benchmark_observers(scenario, list(used)).scores:
+            scores.setdefault(score.name, score)
+            if score.used is not None:
+                used[score.name][f"hidden {hidden}"] = score.used
+            if score.failure is not None:
+                failures[score.name][f"hidden {hidden}"] = score.failure
+    return ranked([Row(scores[c.name], c, used[c.name], {}, failures[c.name]) for c in fitting])
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an observer was the right one.
+
+    Args:
+        label: of the observer. close: whether its error is within `WITHIN` of the smallest, or a tie with it.
+        safe: whether it is safe, or nothing is. share: of the allowance that it uses [1]. rms: of the position [m].
+    """
+
+    label: str
+    close: bool
+    safe: bool
+    share: float
+    rms: float
+
+
+def verdict(name: str, truth: Sequence[Row], factor: float = WITHIN) -> Verdict:
+    """Whether an observer was right.
+
+    Where something is safe its error is held against the smallest error of what is safe; where nothing is, its share of
+    the allowance against the smallest.
+
+    Args:
+        name: of the observer. truth: all rows on hidden seeds. factor: of the smallest that is still close.
+    """
+    row = next(row for row in truth if row.candidate.name == name)
+    safe = [other for other in truth if other.safe]
+    if safe:
+        least = min(other.rms for other in safe)
+        close = row.rms <= max(factor * least, least + TIE * allowed(truth))
+    else:
+        least = min(other.share for other in truth)
+        close = row.share <= max(factor * least, least + TIE)
+    return Verdict(row.label, bool(close), row.safe or not safe, row.share, row.rms)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A train with what was chosen and what is true.
+
+    Args:
+        train: the train. choice: for it. truth: all rows on hidden seeds. seconds: CPU time of the choice [s].
+    """
+
+    train: Train
+    choice: Choice
+    truth: Sequence[Row]
+    seconds: float
+
+    def of(self, label: str) -> Verdict:
+        """Of the observer with a label."""
+        name = next((row.candidate.name for row in self.truth if row.label == label), None)
+        if name is None:  # it failed nominally
+            return Verdict(label, False, not any(row.safe for row in self.truth), inf, inf)
+        return verdict(name, self.truth)
+
+    @property
+    def chosen(self) -> Verdict:
+        """Of the choice."""
+        return self.of(self.choice.best.label)
+
+    @property
+    def nominal(self) -> Verdict:
+        """Of what the nominal run alone names."""
+        alone = [Row(r.score, r.candidate, _nominal(r.used), {}, _nominal(r.failures)) for r in self.choice.rows]
+        return self.of(ranked(alone)[0].label)
+
+    @property
+    def best(self) -> Row:
+        """The best row in truth: the smallest error of what is safe, or the smallest share."""
+        safe = [row for row in self.truth if row.safe]
+        return min(safe, key=lambda row: row.rms) if safe else min(self.truth, key=lambda row: row.share)
+
+
+def _nominal(found: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in found.items() if name == "nominal"}
+
+
+def judged(train: Train) -> Judged:
+    """Choose for a train, and hold it against the truth.
+
+    Args:
+        train: the train.
+    """
+    begin = process_time()
+    choice = choose(train.scenario())
+    seconds = process_time() - begin
+    return Judged(train, choice, truth_of(train, choice.benchmark), seconds)
+
+
+def row_of(found: Judged) -> list[str]:
+    """A line of the table.
+
+    Args:
+        found: a train with choice and truth.
+    """
+    train, chosen, nominal, best = found.train, found.chosen, found.nominal, found.best
+    odd = [f"late {train.latency:.1f} s"] * (train.latency > 0.0) + [f"{100 * train.missed:.0f} % missed"] * (
+        train.missed > 0
+    )
+    odd += [] if train.loss is None else [f"{100 * train.loss:.0f} % lost"]
+    share = number(chosen.share) if isfinite(chosen.share) else "diverges"
+    return [
+        f"{train.mass / 1e3:.0f} t, {number(train.gap, 2)} s" + "".join(f", {text}" for text in odd),
+        f"`{chosen.label}`",
+        share,
+        number(chosen.rms),
+        f"`{best.label}`",
+        number(best.share) if isfinite(best.share) else "diverges",
+        number(best.rms),
+        "yes" if chosen.close else "NO",
+        "yes" if chosen.safe else "NO",
+        f"`{nominal.label}` " + ("" if nominal.close and nominal.safe else "(NO)"),
+        f"{found.seconds:.0f}",
+    ]
+
+
+HEADING = (
+    "mass, gap",
+    "chosen",
+    "of allowance",
+    "rms [m]",
+    "best in truth",
+    "of allowance",
+    "rms [m]",
+    "close",
+    "safe",
+    "nominal alone",
+    "CPU [s]",
+)
+
+
+def shares(every: Sequence[Judged]) -> str:
+    """How often each way of choosing is right, as a table.
+
+    Args:
+        every: trains with choice and truth.
+    """
+    ways = {"`cosim choose`": [j.chosen for j in every], "the nominal run alone": [j.nominal for j in every]}
+    ways |= {f"always `{label}`": [j.of(label) for j in every] for label in THUMBS}
+    lines = ["| way | close to the best | safe where anything is |", "| --- | --- | --- |"]
+    for way, found in ways.items():
+        close, safe = sum(v.close for v in found), sum(v.safe for v in found)
+        lines.append(f"| {way} | {close} of {len(found)} | {safe} of {len(found)} |")
+    return "\n".join(lines)
+
+
+def exhibits(every: Sequence[Judged]) -> list[str]:
+    """Labels of the rows that are within `CLOSE` of the best, or tie with it, on no train.
+
+    Args:
+        every: trains with choice and truth.
+    """
+    labels = dict.fromkeys(row.label for found in every for row in found.truth)
+    for found in every:
+        for row in found.truth:
+            if row.label in labels and verdict(row.candidate.name, found.truth, CLOSE).close and _useful(row, found):
+                del labels[row.label]
+    return list(labels)
+
+
+def _useful(row: Row, found: Judged) -> bool:
+    """Whether it is safe, where anything is."""
+    return row.safe or not any(other.safe for other in found.truth)
+
+
+def table(every: Sequence[Judged]) -> str:
+    """The table of trains.
+
+    Args:
+        every: trains with choice and truth.
+    """
+    lines = ["| " + " | ".join(HEADING) + " |", "|" + " --- |" * len(HEADING)]
+    return "\n".join([*lines, *("| " + " | ".join(row_of(found)) + " |" for found in every)])
+
+
+def main(words: Sequence[str]) -> None:
+    """Choose for trains, print the tables; with ``--write`` put them on the page.
+
+    Args:
+        words: of the command line.
+    """
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--first", type=int, default=FIRST)
+    parser.add_argument("--trains", type=int, default=TRAINS)
+    parser.add_argument("--write", action="store_true")
+    options = parser.parse_args(words)
+    every = []
+    for seed in range(options.first, options.first + options.trains):
+        every.append(judged(Train.drawn(seed)))
+        print("| " + " | ".join(row_of(every[-1])) + " |", flush=True)
+    names = ", ".join(f"`{label}`" for label in exhibits(every))
+    parts = {"choices": table(every), "choice_shares": shares(every), "exhibits": f"{names}."}
+    for name, text in parts.items():
+        print(f"\n{text}")
+        if options.write:
+            write_table(PAGE, name, text)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,82 @@
+"""``cosim choose``: the answer, JSON, files, exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from small_scenarios import small
+
+from cosim import Scenario
+from cosim.cli import main
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> str:
+    return str(small().report(evaluate_after=0.1).save(tmp_path / "small.toml"))
+
+
+FEW = ["--observers", "odometer_reset,balise_odometer_ekf:tuned,luenberger", "--seeds", "1", "--quiet"]
+
+
+def test_the_answer_comes_first_and_what_is_written_runs(
+    scenario: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, run, written = tmp_path / "out", tmp_path / "run", tmp_path / "chosen.toml"
+    more = ["--out", str(out), "--record", str(run), "--write", str(written)]
+    assert main(["choose", scenario, *FEW, *more]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("use ")
+    assert "odometer_reset" in text
+    assert "luenberger" in text.partition("not tried")[2].partition("observers on")[0]
+    assert sorted(path.name for path in out.iterdir()) == ["observers.html", "observers.json"]
+    used = json.loads((out / "observers.json").read_text(encoding="utf-8"))["use"]
+    assert f"use {used}" in (out / "observers.html").read_text(encoding="utf-8")
+    assert text.startswith(f"use {used}")
+    outcome = Scenario.load(written).run(warn=lambda _: None)
+    assert outcome.failure is None
+    assert len(outcome.spec.observers) == 1
+    assert main(["choose", scenario, *FEW, "--from", str(run), "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert {row["observer"] for row in data["rows"]} >= {"odometer_reset", "balise_odometer_ekf:tuned"}
+    assert [entry["name"] for entry in data["runs"]] == ["nominal", "seed 1", "harder 2"]
+
+
+def test_the_former_name_says_what_is_typed_now(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["benchmark-observers", scenario])
+    assert "cosim choose" in capsys.readouterr().err
+
+
+def test_where_nothing_comes_through_it_is_an_error_with_the_reasons(
+    scenario: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["choose", scenario, "--observers", "thau", "--quiet"]) == 2
+    assert "thau: cannot be coupled: nothing in this scenario gives its inputs torque" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--observers", "obsever"], "unknown observer 'obsever'; did you mean 'observer'"),
+        (["--from", "nowhere"], "nowhere"),
+        (["--set", "balises.layout=recorded"], "layout 'recorded' needs 'file'"),
+        (["--allowance", "five"], "allowance 'five': expected metres plus per cent of the distance"),
+        (["--seeds", "-1"], "seeds must not be negative, got -1"),
+    ],
+)
+def test_mistakes_are_exit_code_2_in_words(
+    arguments: list[str], words: str, scenario: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["choose", scenario, "--quiet", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("arguments", [["--observers", ","], ["--from", "a", "--record", "b"]])
+def test_arguments_that_cannot_be_are_refused(arguments: list[str], scenario: str) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["choose", scenario, *arguments])
+    assert stopped.value.code == 2
