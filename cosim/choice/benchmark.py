@@ -22,6 +22,7 @@ from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.evaluation.result_warnings import largest_tolerable
 from cosim.evaluation.roles import recorded as recorded_signal
 from cosim.evaluation.spec import ReportSpec
+from cosim.report.page.observer_page import write_benchmark
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.results.results_folder import write_results
@@ -54,8 +55,6 @@ class ObserverBenchmark(BenchmarkScores):
         Raises:
             OutputError: the folder cannot be written.
         """
-        from cosim.report.page.observer_page import write_benchmark  # noqa: PLC0415 - matplotlib only for those who write
-
         return write_benchmark(self, directory)
 
 

@@ -17,6 +17,7 @@ from cosim.choice.disturbances import Disturbance
 from cosim.choice.playback import connection
 from cosim.choice.ranking import Row
 from cosim.errors import RunError
+from cosim.report.page.observer_page import Answer, write_benchmark
 from cosim.simulation.scenario import Scenario
 from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
@@ -147,8 +148,6 @@ class Choice(Readable):
         Raises:
             OutputError: the folder cannot be written.
         """
-        from cosim.report.page.observer_page import Answer, write_benchmark  # noqa: PLC0415 - for those who write
-
         labels = {PLAIN, *(row.label for row in self.rows[:_SHOWN])}
         shown = replace(self.benchmark, scores=tuple(s for s in self.benchmark.scores if s.label in labels))
         good = self.found and self.best.safe
