@@ -219,10 +219,10 @@ class Verdicts:
 
     Attributes:
         found: whether the jam was told. delay: from its onset to that [s], NaN where it was not.
-        late: from its end to that of the fault told [s], infinite where that was not before rest, NaN where the jam was
-            not told, or was over less than `ROOM` before rest.
-        false: number of faults told without a jam. on: whether a fault was still told when the train came to rest.
-        moving: time for which the train moved and faults were judged [s].
+        late: from its end to that of the fault reported [s], infinite where that was not before rest, NaN where the jam
+        was not told, or was over less than `ROOM` before rest. false: number of faults told without a jam. on: whether
+        a fault was still reported when the train came to rest. moving: time for which the train moved and faults were
+        judged [s].
     """
 
     found: np.ndarray

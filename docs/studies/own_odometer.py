@@ -1,4 +1,4 @@
-"""Train observers beside the odometer that they hear: how far each is off, and how much worse than the odometer.
+"""Train observers beside the odometer that they use: how far each is off, and how much worse than the odometer.
 
 ``python docs/studies/own_odometer.py`` prints the table of docs/theses/own_odometer.md, with ``--write`` it puts it
 there; that takes half a minute of CPU. Each situation is one run with all observers in it.

@@ -1,4 +1,4 @@
-"""Which parts of the stories of Sc1 to Sc4 come out, over the seeds of the receiver and over rails that nobody printed.
+"""Which parts of the stories of Sc1 to Sc4 come out, over seeds of the receiver and over rails that are not printed.
 
 ``python docs/studies/stories.py`` prints the tables of docs/theses/multi_vehicle_train.md (15 minutes on two cores).
 Three studies:

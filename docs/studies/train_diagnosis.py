@@ -1,4 +1,4 @@
-"""Thresholds, false alarms and detections of the train's diagnosis, and what can be told apart with which sensors.
+"""Thresholds, false alarms and detections of the train's diagnosis, and which faults which sensors distinguish.
 
 ``python docs/studies/train_diagnosis.py`` prints the tables of docs/theses/train_diagnosis.md, with ``--write`` it
 writes them (four minutes). Thresholds come from fault-free journeys, a stated rate of false alarms each; false alarms

@@ -1,5 +1,5 @@
-"""What the train's diagnosis tells of two faults at once, of sizes between the usual ones, and of a radar with coloured
-noise: on journeys that no threshold saw, dry and wet.
+"""The train's diagnosis with two faults at once, with sizes between the usual ones, and with a radar of coloured noise:
+on journeys from which no threshold came, dry and wet.
 
 ``python docs/studies/train_diagnosis_pairs.py`` prints the tables of docs/theses/train_diagnosis.md, with ``--write``
 it puts them there (five minutes of CPU time).

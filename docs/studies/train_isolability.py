@@ -1,4 +1,4 @@
-"""What can be told apart at all: structural analysis of a train's sensors by faultdiagnosistoolbox, beside our table.
+"""Which faults can be distinguished at all: structural analysis of a train's sensors by faultdiagnosistoolbox.
 
 ``python docs/studies/train_isolability.py`` prints the table of docs/theses/train_diagnosis.md, with ``--write`` it
 writes it. The structural model says which variable and which fault stands in which equation, and nothing of sizes,

@@ -1,4 +1,4 @@
-"""Observers of the train on the line Amsterdam - Utrecht before and after tuning, judged with seeds that no search saw.
+"""Observers of the train on the line Amsterdam - Utrecht before and after tuning, with seeds that no search used.
 
 ``python docs/studies/tuning_the_train.py`` prints the table of docs/theses/tuning_the_train.md, with ``--write`` it
 puts it there; that takes 35 s of CPU. ``--quick`` takes one seed and the first minute. The scenario is the file

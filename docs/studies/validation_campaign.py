@@ -1,4 +1,4 @@
-"""The tables of docs/theses/validation_campaign.md: the shipped campaign over twenty seeds, and its thresholds.
+"""The validation campaign over twenty seeds, and its thresholds: the tables of docs/theses/validation_campaign.md.
 
 ``python docs/studies/validation_campaign.py`` writes them into the page (5 minutes on one core). Published numbers are
 Tables 5.2 to 5.7 of Aguiar Cota 2019.

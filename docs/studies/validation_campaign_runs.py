@@ -1,5 +1,5 @@
-"""What lies behind the rates of docs/theses/validation_campaign.md: each jam that was missed, each false detection, the
-residual without jams, and the bounds of Table 5.9 over the samples that were not used.
+"""Behind the rates of the validation campaign: each jam that was missed, each false detection, the residual without
+jams, and the bounds of Table 5.9 over the samples that were not used. See docs/theses/validation_campaign.md.
 
 ``python docs/studies/validation_campaign_runs.py`` writes the tables into the page (3 minutes on one core). Published
 numbers are those of Aguiar Cota 2019.

@@ -16,7 +16,7 @@ PLAN = (
     "which makes steps in the disturbance; here it is constant"
 )
 HELD = "ours: with the innovation held in place of the reading the residual has no bias"
-COUNTED = "ours, and other noise: samples at which a fault is told, of 220 of a run, mean of 100 runs"
+COUNTED = "ours, and other noise: samples at which a fault is reported, of 220 of a run, mean of 100 runs"
 
 
 def main() -> None:

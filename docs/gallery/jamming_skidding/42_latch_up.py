@@ -11,14 +11,14 @@ from shared.sheet import Sheet
 
 NOISE, MEMBERS = 0.02, 50
 LATE = (
-    "share of 50 runs on random phases of the grade that still tell a fault just before rest; the independent runs say "
-    "that it latches"
+    "share of 50 runs on random phases of the grade that still report a fault just before rest; the independent runs "
+    "say that it latches"
 )
 TURNED = (
     "ours: the thesis has jams only. What the effort does not cause is followed after 1.2 s, and told until a balise "
     "or 20 s of rolling confirm it: longer than the rest of a short braking"
 )
-OURS = "ours: the longest time from the end of the jam to the end of the fault told"
+OURS = "ours: the longest time from the end of the jam to the end of the fault reported"
 CASES_OF_4_12: dict[str, tuple[str, float | None, dict[str, Any]]] = {
     # name: case, length of the jam at 8 s, options
     "3.3.4, start 0.9 m/s off, no arming delay": ("3.3.4", None, {"estimated_speed": 44.1, "arming_delay": 0.0}),
@@ -48,17 +48,25 @@ def main() -> None:
             share = 100.0 * float(fault[np.arange(MEMBERS), last].mean())
             story = "latches" if rules == "printed" else "not tried"
             sheet.add(
-                f"{name}: fault told before rest, {rules} rules", "%", None, share, LATE, repeats=0.3, independent=story
+                f"{name}: fault reported before rest, {rules} rules",
+                "%",
+                None,
+                share,
+                LATE,
+                repeats=0.3,
+                independent=story,
             )
             if rules == "repaired" and length is not None:
                 over = np.where(fault & (t >= 8.0 + length), t, 0.0).max(axis=1)
                 late = float(np.maximum(over + PERIOD - 8.0 - length, 0.0).max())
-                sheet.add(f"{name}: fault told after the jam, repaired rules", "s", None, f"at most {late:.1f}", OURS)
+                sheet.add(
+                    f"{name}: fault reported after the jam, repaired rules", "s", None, f"at most {late:.1f}", OURS
+                )
             if rules == "repaired" and jams is not None:
                 fast = readings(run, jams.turned, NOISE, rng, True)
                 on = (observe(case, run, fast, with_balises=False, noise=NOISE)["odometer_fault"] > 0.5) & moving
                 share = 100.0 * float(on[np.arange(MEMBERS), last].mean())
-                reported = f"{name.replace('jam', 'skid')}: fault told before rest, repaired rules"
+                reported = f"{name.replace('jam', 'skid')}: fault reported before rest, repaired rules"
                 sheet.add(reported, "%", None, share, TURNED, repeats=0.3)
             if number == 1:
                 axis.plot(t, np.clip(found["speed"][0], 0.0, 60.0), label=f"{rules} rules")

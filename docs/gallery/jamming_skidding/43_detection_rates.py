@@ -14,8 +14,8 @@ REAL = (
     "alarm. The intervals of such counts are in docs/theses/jam_detection.md"
 )
 PRINTED = (
-    "with the reading held the residual has a bias of two thirds of the threshold: the printed rules tell a fault most "
-    "of the time"
+    "with the reading held the residual has a bias of two thirds of the threshold: the printed rules report a fault "
+    "most of the time"
 )
 SMALL = "low speed: gains and thresholds of chapter 5 have not settled 7 s after the start"
 TURNED = "ours: the thesis has jams only; the wheel is too fast by as much, for the same times"
@@ -49,7 +49,9 @@ def main() -> None:
             late = np.sort(v.late[~np.isnan(v.late)])
             style = "--" if sign else "-" if rules == "repaired" else ":"
             axis.plot(late, 100.0 * np.arange(1, len(late) + 1) / len(late), style, label=f"{case}, {rules}{sign}")
-    axis.set(xlim=(0.0, 2.5), xlabel="end of the fault told after that of the jam [s]", ylabel="of the jams found [%]")
+    axis.set(
+        xlim=(0.0, 2.5), xlabel="end of the fault reported after that of the jam [s]", ylabel="of the jams found [%]"
+    )
     axis.legend(fontsize=8)
     sheet.finish(figure)
 

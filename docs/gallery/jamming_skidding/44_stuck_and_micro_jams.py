@@ -29,7 +29,7 @@ def main() -> None:
             found, what = observe(CASE, run, stuck, with_balises=with_balises, noise=NOISE), f"stuck 10 % {side}, {how}"
             error = np.abs(found["position"] - position)
             reported = 100.0 * float((found["odometer_fault"][:, window] > 0.5).mean())
-            sheet.add(f"{what}: fault told", "% of the time", None, reported, STUCK, repeats=0.1)
+            sheet.add(f"{what}: fault reported", "% of the time", None, reported, STUCK, repeats=0.1)
             sheet.add(f"{what}: largest position error", "m", None, error[:, window].max(), STUCK, repeats=0.2)
             axis.plot(t[window], error[0, window], "-" if jams is low else "--", label=f"{side}, {how}")
         alone = np.abs(odometer_error(position, stuck, 200.0))
@@ -44,7 +44,11 @@ def main() -> None:
         error = np.abs(found["position"] - position)[:, window].max()
         alone = np.abs(odometer_error(position, micro, 200.0))[:, window].max()
         sheet.add(
-            f"{what}: fault told", "% of the time", "not detectable" if sign < 0.0 else None, f"{reported:.0f}", OURS
+            f"{what}: fault reported",
+            "% of the time",
+            "not detectable" if sign < 0.0 else None,
+            f"{reported:.0f}",
+            OURS,
         )
         sheet.add(f"{what}: largest position error", "m", None, error, OURS, repeats=0.1)
         sheet.add(f"{what}: odometer reset at balises", "m", None, alone, OURS, repeats=0.1)

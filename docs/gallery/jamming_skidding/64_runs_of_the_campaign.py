@@ -99,7 +99,7 @@ def main() -> None:
     axes.flat[len(FIGURES) - 1].set_xlabel("time [s]")
     axes.flat[len(FIGURES) - 2].set_xlabel("time [s]")
     handles, labels = axes.flat[0].get_legend_handles_labels()
-    axes[-1, -1].legend(handles, labels, loc="center", title="grey: jam; red: fault told")
+    axes[-1, -1].legend(handles, labels, loc="center", title="grey: jam; red: fault reported")
     picture.supylabel("position error [m]")
     sheet.finish(picture)
 

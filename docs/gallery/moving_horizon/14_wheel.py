@@ -57,7 +57,7 @@ def main() -> None:
     found = np.array(WHEEL_CLASSES.labels)[WHEEL_CLASSES.classify(recorded, strip=0.0).index]
     for label in (STEADY, DROP, RISE):
         share = 100.0 * np.mean(found[np.array(labels) == label] == label)
-        sheet.add(f"records told right, {label}", "%", None, share, WINDOWS)
+        sheet.add(f"records classified right, {label}", "%", None, share, WINDOWS)
     why = OURS.format(seed=HELD_OUT_SEED)
     shown: dict[str, list[tuple[float, float]]] = {"signature": [], "rules": []}
     for sign in ("", ", skids"):
@@ -92,7 +92,7 @@ def add_rates(sheet: Sheet, name: str, verdicts_of: list[Verdicts], why: str) ->
     sheet.add(f"mean delay, {name}", "s", None, float(np.nanmean(delays)), why)
     sheet.add(f"median of the end after the jam's, {name}", "s", None, float(np.median(late[~np.isnan(late)])), why)
     still = float(100.0 * np.concatenate([v.on for v in verdicts_of]).mean())
-    sheet.add(f"still told when the train stands, {name}", "%", None, still, why)
+    sheet.add(f"still reported when the train stands, {name}", "%", None, still, why)
     return 100.0 * float(missed.sum()) / total, false / hours
 
 
