@@ -9,6 +9,15 @@ _ALIKE = 0.65
 _MOST = 3
 
 
+def missing_file(path: Path, *endings: str) -> str:
+    """That a file does not exist, with what may be meant.
+
+    Args:
+        path: that leads nowhere. endings: as for `near_files`.
+    """
+    return f"{str(path).encode('unicode_escape').decode()} does not exist; {near_files(path, *endings)}"
+
+
 def near_files(path: Path, *endings: str) -> str:
     """A hint with the names of files nearest to one that does not exist.
 
@@ -27,6 +36,6 @@ def near_files(path: Path, *endings: str) -> str:
     fitting = [name for name in names if not endings or name.lower().endswith(endings)]
     near = get_close_matches(path.name, fitting, _MOST, _ALIKE)
     if near:
-        return f"did you mean {', '.join(repr(str(folder / name)) for name in near)}?"
+        return f"did you mean {', '.join(repr(name) for name in near)}?"
     shown = ", ".join(fitting[:8]) + (", ..." if len(fitting) > 8 else "")
     return f"in that folder there is: {shown}." if fitting else f"that folder has no {' or '.join(endings) or 'file'}."

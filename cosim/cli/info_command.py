@@ -10,6 +10,7 @@ from typing import Any
 
 from cosim import ssp
 from cosim.components.description import read_description, runs_here
+from cosim.errors import ScenarioError
 from cosim.scenario.package_names import is_package
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
@@ -49,6 +50,8 @@ def execute(options: argparse.Namespace) -> Output:
 
 
 def _described_file(path: Path) -> dict[str, Any]:
+    if path.suffix.lower() == ".toml":
+        raise ScenarioError(f"{path} is a scenario; 'cosim show {path}' shows what is in it.")
     description = read_description(path, "info")  # which says what is wrong with a file
     declared = list(read_capabilities(description).declared())
     return {"runs here": runs_here(path), "declares": declared} | describe_file(path)

@@ -13,7 +13,7 @@ from typing import Any
 
 from cosim import studies
 from cosim.cli.arguments import MANY_RUNS, QUIET, positive, scenario_arguments
-from cosim.cli.output import ignore, print_notice, print_warning
+from cosim.cli.output import Warnings, ignore, print_notice
 from cosim.cli.scenarios import load_scenario, simulated_time_bar
 from cosim.errors import OutputError
 from cosim.evaluation.consistency import filter_consistency
@@ -25,16 +25,19 @@ from cosim.evaluation.fault_table import fault_table
 from cosim.evaluation.metrics import phase_metrics
 from cosim.expectations.evaluated import evaluated_table
 from cosim.process.last_call import LAST_CALL
+from cosim.report.page.run_verdict import observer_statuses, run_verdict
 from cosim.results.results_folder import check_writable
 from cosim.results.unfinished import UNFINISHED
 from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
+from fmus.cli.colour import Role
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from fmus.tables.table import Table
 
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
+_ROLES: dict[str, Role] = {"good": "good", "doubt": "doubtful", "bad": "bad"}
 CALL_LOG = "calls.log"
 SEEDS = "seeds"
 """Folder of the sweep over seeds, among the results."""
@@ -90,6 +93,9 @@ ARGUMENTS = (
         action="store_true",
         help="write results while the run goes on, as table.npy, so that they survive a crash",
     ),
+    argument(
+        "--verbose", action="store_true", help="warnings whole, calls of the components, expectations that are met"
+    ),
     QUIET,
 )
 
@@ -142,11 +148,12 @@ def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, cal
     """Run, with a bar."""
     directory = results.directory
     bar = simulated_time_bar(silent=options.quiet or options.json)
+    warnings = Warnings(whole=options.verbose)
     try:
         with _kept(directory, options.stream, scenario.table().report.tables) as fallback:
             scenario.run(
                 progress=bar,
-                warn=print_warning,
+                warn=warnings,
                 call_log=call_log,
                 building=ignore if options.quiet else print_notice,
                 stream=directory if options.stream else None,
@@ -155,6 +162,7 @@ def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, cal
             )
     finally:
         bar.close()
+        warnings.end()
 
 
 @contextmanager
@@ -209,14 +217,26 @@ def _output(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpa
     failed_seeds = study is not None and study.failures
     unmet = outcome.unmet or failed_seeds or (options.strict and outcome.warnings)
     code = ERROR if failure is not None else NOT_AS_ASKED if unmet else DONE
+    verbose = options.verbose or options.json
+    expectations = evaluated_table(outcome.expectations)
     parts = [
         _headline(summary),
         *(_tables(outcome) if outcome.result.table.size else []),
-        cost_table(outcome.result),
+        cost_table(outcome.result) if verbose else "",
         "" if study is None else study.table(),
-        evaluated_table(outcome.expectations),
+        expectations if verbose else _unmet(expectations),
     ]
-    return Output(parts, data, paths, code, [] if failure is None else [f"the run ended early: {failure}"])
+    if failure is not None:
+        return Output(parts, data, paths, code, [f"the run ended early: {failure}"])
+    verdict = run_verdict(
+        outcome.result, outcome.spec, outcome.expectations, observer_statuses(outcome.result, outcome.spec)
+    )
+    return Output(parts, data, paths, code, verdict=verdict.text, role=_ROLES[verdict.mood])
+
+
+def _unmet(expectations: Table) -> Table:
+    """The rows of what is not met; the verdict says whether all are."""
+    return replace(expectations, rows=[row for row in expectations.rows if row[0] != "met"])
 
 
 def _tables(outcome: Outcome) -> list[Table]:

@@ -18,7 +18,7 @@ from cosim.scenario.package_names import is_package
 from cosim.scenario.paths import absolute, map_paths
 from cosim.scenario.shipped import shipped_file, shipped_scenarios
 from cosim.scenario.toml_file import read_toml
-from fmus.near_files import near_files
+from fmus.near_files import missing_file
 
 CONNECTIONS = "connections"
 Key = tuple[str, ...]
@@ -90,7 +90,7 @@ def find_file(name: str | Path, folder: Path = Path()) -> Path:
             return shipped
         hint = nearest(str(name), [*shipped_scenarios(), *(p.name for p in folder.glob("*.toml"))])
         raise ScenarioError(f"No scenario {str(name)!r}; {hint}")
-    raise ScenarioError(f"Scenario file {path} does not exist; {near_files(path, '.toml', '.ssp')}")
+    raise ScenarioError(f"Scenario file {missing_file(path, '.toml', '.ssp')}")
 
 
 def read_tables(path: Path, chain: Sequence[Path] = ()) -> Tables:

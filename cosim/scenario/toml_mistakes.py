@@ -121,6 +121,11 @@ def _semicolon(line: str) -> str:
     return "" if found is None else f"a semicolon at its end; write {found['whole'].strip()}"
 
 
+def _no_value(line: str) -> str:
+    found = re.match(_KEY + "=" + _END, line)
+    return "" if found is None else f"{found['key']} has no value behind ="
+
+
 _MISTAKES: tuple[Callable[[str], str], ...] = (
     _quotation_marks,
     _comma,
@@ -130,5 +135,6 @@ _MISTAKES: tuple[Callable[[str], str], ...] = (
     _backslash,
     _no_quotation_marks,
     _colon,
+    _no_value,
 )
 """In their order: the first that fits is reported."""

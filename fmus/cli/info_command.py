@@ -9,7 +9,7 @@ from typing import Any
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.fmu_report import describe_file, description_parts, problems_of
-from fmus.near_files import near_files
+from fmus.near_files import missing_file
 
 OK, PROBLEMS = 0, 1
 
@@ -28,7 +28,7 @@ def execute(options: argparse.Namespace) -> Output:
         FileNotFoundError: there is no such file.
     """
     if not options.file.is_file():
-        raise FileNotFoundError(f"{options.file} does not exist; {near_files(options.file, '.fmu')}")
+        raise FileNotFoundError(missing_file(options.file, ".fmu"))
     data, problems = describe_file(options.file), problems_of(options.file)
     parts = [*description_parts(data), "\n".join(f"problem: {problem}" for problem in problems)]
     return Output(parts, data | {"problems": problems}, code=PROBLEMS if problems else OK)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fmus.cli.colour import Role, coloured
 from fmus.cli.parsers import print_error
 from fmus.plain import plain
 from fmus.tables.plain_data import jsonable
@@ -24,6 +25,7 @@ class Output:
         data: for programs. A mapping also gets each table of `parts` that it does not hold, under its key, and `files`;
             None for the tables, and the texts of `parts` under ``text``.
         files: what was written, by kind. code: exit code. failures: texts for standard error.
+        verdict: what it comes to, in a sentence, which is printed last. role: what the verdict is.
         error: what ended the command although there is something to show; raised when that has been shown.
     """
 
@@ -33,6 +35,8 @@ class Output:
     code: int = 0
     failures: Sequence[str] = ()
     error: BaseException | None = None
+    verdict: str = ""
+    role: Role = "good"
 
     def to_data(self) -> Any:
         """All of it for programs, ready for JSON."""
@@ -40,6 +44,7 @@ class Output:
         if isinstance(data, Mapping):
             data = {part.key: part.data() for part in self.parts if isinstance(part, Table)} | dict(data)
             data |= {"files": self.files} if self.files else {}
+            data |= {"verdict": self.verdict} if self.verdict else {}
         return jsonable(data)
 
     def text(self, width: int | None = None) -> str:
@@ -48,7 +53,8 @@ class Output:
         Args:
             width: of the terminal, which is not exceeded; None for lines as long as they are.
         """
-        return joined([*self.parts, "\n".join(f"{kind:>10}: {path}" for kind, path in self.files.items())], width)
+        files = "\n".join(f"{kind:>10}: {path}" for kind, path in self.files.items())
+        return joined([*self.parts, files, self.verdict], width)
 
     def show(self, program: str, *, as_json: bool) -> int:
         """Print it; nothing but JSON goes to standard output where that was asked for.
@@ -60,6 +66,9 @@ class Output:
             The exit code.
         """
         text = json.dumps(self.to_data(), indent=2, allow_nan=False) if as_json else plain(self.text(terminal_width()))
+        if self.verdict and not as_json:
+            end = plain(joined([self.verdict], terminal_width()))
+            text = text.removesuffix(end) + coloured(end, self.role)
         if text:
             print(text)
         for failure in self.failures:

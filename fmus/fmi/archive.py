@@ -18,7 +18,7 @@ from fmus.fmi.binaries import platform_folder, platforms_with, why_not_here
 from fmus.fmi.description import FILE, read_description
 from fmus.fmi.sense import distinguish, nonsense
 from fmus.fmi.standard import INTERFACES
-from fmus.near_files import near_files
+from fmus.near_files import missing_file
 
 MAX_UNPACKED_BYTES = 2 * 1024**3
 MAX_FILES = 100_000
@@ -111,8 +111,8 @@ def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES, versions: Sequ
         NotAnFmuError: it is missing, broken, dangerous, no FMU, or of an FMI version that is not known here.
     """
     if not path.is_file():
-        what = "is a folder, expected an .fmu file." if path.is_dir() else f"does not exist; {near_files(path, '.fmu')}"
-        raise NotAnFmuError(f"FMU {path} {what}")
+        what = f"{path} is a folder, expected an .fmu file." if path.is_dir() else missing_file(path, ".fmu")
+        raise NotAnFmuError(f"FMU {what}")
     try:
         with zipfile.ZipFile(path) as archive:
             entries = archive.infolist()

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Container, Sequence
 from itertools import zip_longest
 from textwrap import wrap
+from typing import TextIO
 
 GAP = "  "
 INDENT = "  "
@@ -23,16 +24,20 @@ BREAKS = "._/,;:-"
 Lines = list[str]
 
 
-def terminal_width() -> int | None:
+def terminal_width(stream: TextIO | None = None) -> int | None:
     """Columns of the terminal that is printed to: as the variable COLUMNS says, or the terminal itself; None where it
     is none.
+
+    Args:
+        stream: that is printed to; None for standard output.
     """
+    to = sys.stdout if stream is None else stream
     asked = os.environ.get("COLUMNS", "")
     if asked.isdecimal() and int(asked) > 0:
         return int(asked)
     try:
-        return (os.get_terminal_size(sys.stdout.fileno()).columns or None) if sys.stdout.isatty() else None
-    except (OSError, ValueError):  # standard output was replaced or closed
+        return (os.get_terminal_size(to.fileno()).columns or None) if to.isatty() else None
+    except (OSError, ValueError):  # the stream was replaced or closed
         return None
 
 

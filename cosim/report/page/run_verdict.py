@@ -108,7 +108,7 @@ def run_verdict(
     mood = "bad" if unmet or (statuses and all(s.fails for s in statuses)) else "good" if good else "doubt"
     others = len(all_warnings(result, spec)) - sum(s.fails for s in statuses)
     if others > 0 and mood == "good":
-        mood, text = "doubt", f"{text} {others} {'warning' if others == 1 else 'warnings'}: see below."
+        mood, text = "doubt", f"{text} {others} {'warning' if others == 1 else 'warnings'}."
     return Verdict(_with_unmet(unmet, evaluated, text), mood)  # type: ignore[arg-type]  # one of the moods
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ import fmu_observer
 import plant_models
 from cosim import Scenario
 from cosim.cli import main
+from cosim.cli.output import Warnings
 from cosim.cli.scenarios import parse_setting
 from cosim.errors import RunError
 from cosim.results.results_folder import read_results
@@ -39,6 +41,35 @@ def test_run_writes_everything_and_prints_a_table(tmp_path: Path, capsys: pytest
     result = read_results(tmp_path / "out")
     assert result.time[-1] == 0.3
     assert result.summary["scenario"] == "script"
+
+
+@pytest.mark.usefixtures("quick")
+def test_the_verdict_comes_last_and_warnings_take_a_line_each(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    late = ["run", "any", "--out", str(tmp_path), "--no-report", "--set", "balises.expected_speed=1.0"]
+    assert main(late) == 0
+    brief = capsys.readouterr()
+    verdict = brief.out.splitlines()[-1]
+    assert verdict.startswith("observer is off by at most ")
+    assert re.fullmatch(r"(warning: .* \.\.\.\n)+\(--verbose shows warnings whole\)\n", brief.err)
+    assert main([*late, "--verbose"]) == 0
+    whole = capsys.readouterr()
+    assert whole.out.splitlines()[-1] == verdict
+    assert len(whole.out) > len(brief.out)
+    assert len(whole.err) > 2 * len(brief.err)
+    assert main([*late, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["verdict"] == verdict
+
+
+def test_a_warning_is_cut_to_the_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    warnings = Warnings(whole=False)
+    warnings("The train never moves: train.speed stays below 0.01 m/s up to 10 s. Errors beside it say nothing.")
+    warnings("Short.")
+    warnings.end()
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["warning: The train never moves ...", "warning: Short.", "(--verbose shows warnings whole)"]
 
 
 @pytest.mark.usefixtures("quick")

@@ -64,8 +64,8 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("installed")
 def test_lists_show_origins_and_what_cannot_be_used(capsys: pytest.CaptureFixture[str]) -> None:
-    for command in (main, fmus):
-        assert command(["list"]) == 0
+    for command, words in ((main, ["list", "--all"]), (fmus, ["list"])):
+        assert command(words) == 0
         said = capsys.readouterr().out
         shown, _, unusable = said.partition("# Cannot be used")
         assert "# An installed package (plant_models.railway.vehicle.locomotive:Locomotive)\n" in shown

@@ -192,7 +192,7 @@ at_most = 1
 
 
 @pytest.mark.parametrize(
-    ("limit", "code", "head"), [(1.0, 0, "All 2 expectations met"), (-1.0, 1, "1 of 2 expectations not met")]
+    ("limit", "code", "head"), [(1.0, 0, "All 2 expectations are met."), (-1.0, 1, "1 of 2 expectations not met")]
 )
 def test_the_command_ends_with_1_where_something_is_unmet(
     limit: float, code: int, head: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -163,7 +163,7 @@ def test_misspelt_path_names_its_neighbours(tmp_path: Path) -> None:
     (tmp_path / "train.csv").write_text("time\n")
     with pytest.raises(OutputError, match=r"There is no .*trian\.csv; did you mean 'train\.csv'"):
         load_result(tmp_path / "trian.csv")
-    with pytest.raises(OutputError, match="nor is there a folder"):
+    with pytest.raises(OutputError, match="there is no folder"):
         load_result(tmp_path / "results" / "trian.csv")
 
 

@@ -39,7 +39,7 @@ def test_a_file_from_windows_is_read(data: bytes, tmp_path: Path) -> None:
             b"stop = 1.0\n<<<<<<< HEAD\nstep = 0.1\n=======\nstep = 0.2\n>>>>>>> x\n",
             "line 2 begins the conflict of a merge",
         ),
-        (b"stop = \n", "at line 1, column 8"),
+        (b"stop = \n", "line 1: stop has no value behind ="),
         (archive(), "'cosim new' writes a scenario"),
     ],
     ids=["utf-16", "latin-1", "conflict", "typing", "fmu"],
