@@ -24,7 +24,7 @@ PROGRAM = CommandProgram(
     (
         ("See a train and observers run", "cosim run freight_profile_d"),
         ("Put your FMU beside an observer", "cosim new vendor.fmu\ncosim run vendor.toml"),
-        ("Find the observer that fits", "cosim benchmark-observers vendor.toml"),
+        ("Find the observer that fits", "cosim choose vendor.fmu"),
         (
             "Check a new delivery of an FMU",
             "cosim baseline make vendor.toml vendor.json\ncosim baseline check vendor.json",

@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from cosim import ssp
+from cosim import ssp, starter
 from cosim.errors import ScenarioError
 from cosim.scenario.package_names import is_package
 from cosim.scenario.shipped import shipped_scenarios, shipped_tables
@@ -19,7 +19,7 @@ from fmu_observer import OBSERVERS
 from fmu_observer.recommended import RECOMMENDED
 from fmus.catalogue import CatalogueEntry, catalogue
 from fmus.cli.commands import argument
-from fmus.cli.list_command import COLUMNS, model_data, model_tables
+from fmus.cli.list_command import COLUMNS, model_data, model_tables, summary
 from fmus.cli.output import Output
 from fmus.tables.table import Table, pairs_table
 from plant_models import PLANTS
@@ -85,9 +85,7 @@ def execute(options: argparse.Namespace) -> Output:
         ScenarioError: nothing holds the words.
     """
     if options.target is not None:
-        from cosim.cli.fitting_observers import fitting_output  # noqa: PLC0415 - it reads FMUs and scenarios
-
-        return fitting_output(options.target, catalogue())
+        return _fitting(options.target)
     if options.words and is_package(options.words[0]):
         variants = ssp.list_variants(options.words[0])
         return Output(["variants:", pairs_table("variants", variants)], {"variants": variants})
@@ -150,3 +148,16 @@ def _parts(found: _Found, *, brief: bool) -> list[Table | str]:
         if entries:
             parts += [f"{kind}:", *model_tables(kind, entries, brief=brief)]
     return parts
+
+
+def _fitting(target: Path) -> Output:
+    """The observers that an FMU or a scenario can drive."""
+    known = catalogue()
+    found = starter.find_fitting(target, known)
+    read = {name for observer in OBSERVERS for name in (*known[observer].inputs, *known[observer].events)}
+    said = [f"{target} has: {', '.join(sorted(found.available & read)) or 'nothing that an observer reads'}."]
+    said += ["observers that fit:" if found.names else "No observer fits."]
+    rows = [[name, RECOMMENDED.get(name) or summary(known[name])] for name in found.names]
+    end = f"{len(found.misfits)} others need what is not there; --json names it for each."
+    data = {"available": sorted(found.available), "observers": found.names, "misfits": found.misfits}
+    return Output([*said, Table("observers", COLUMNS, rows), end], data)

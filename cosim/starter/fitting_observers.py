@@ -4,7 +4,8 @@ descriptions only.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.run.connections import parse_connections
@@ -15,34 +16,39 @@ from cosim.starter.starter_roles import plant_roles
 from fmu_observer import OBSERVERS
 from fmu_observer.recommended import RECOMMENDED
 from fmus.catalogue import CatalogueEntry
-from fmus.cli.list_command import COLUMNS, summary
-from fmus.cli.output import Output
-from fmus.tables.table import Table
 
 BALISE, PACKET = "balise", "packet"
 """Events that a scenario triggers."""
 
 
-def fitting_output(path: Path, known: Mapping[str, CatalogueEntry]) -> Output:
-    """The observers that fit, the recommended ones first, and why the others do not.
+@dataclass(frozen=True)
+class FittingObservers:
+    """Which observers fit.
 
     Args:
-        path: an FMU or a scenario. known: the catalogue.
+        available: names of signals and events that there is something for. names: of the observers that fit, the
+            recommended ones first. misfits: what each of the others lacks.
+    """
+
+    available: Set[str]
+    names: Sequence[str]
+    misfits: Mapping[str, str]
+
+
+def find_fitting(path: Path, known: Mapping[str, CatalogueEntry]) -> FittingObservers:
+    """The observers that an FMU or a scenario can drive.
+
+    Args:
+        path: of the FMU, or file or name of the scenario. known: the catalogue.
 
     Raises:
         CosimError: the file cannot be read.
     """
-    given = _of_fmu(path) if path.suffix.lower() == ".fmu" else _of_scenario(path)
+    available = _of_fmu(path) if path.suffix.lower() == ".fmu" else _of_scenario(path)
     order = [*RECOMMENDED, *(name for name in OBSERVERS if name not in RECOMMENDED)]
-    misfits = {name: _misfit(known[name], given) for name in order}
+    misfits = {name: _misfit(known[name], available) for name in order}
     fitting = [name for name in order if not misfits[name]]
-    table = Table("observers", COLUMNS, [[name, RECOMMENDED.get(name) or summary(known[name])] for name in fitting])
-    used = {name for entry in OBSERVERS for name in (*known[entry].inputs, *known[entry].events)}
-    signals = ", ".join(sorted(given & used)) or "nothing that an observer reads"
-    said = [f"{path} has: {signals}.", "observers that fit:" if fitting else "No observer fits."]
-    end = f"{len(order) - len(fitting)} others need what is not there; --json names it for each."
-    data = {"available": sorted(given), "observers": fitting, "misfits": {n: why for n, why in misfits.items() if why}}
-    return Output([*said, table, end], data)
+    return FittingObservers(available, fitting, {name: why for name, why in misfits.items() if why})
 
 
 def _of_fmu(path: Path) -> Set[str]:
@@ -70,11 +76,11 @@ def _of_scenario(path: Path) -> Set[str]:
     return names | ({PACKET} if table.network is not None else set())
 
 
-def _misfit(entry: CatalogueEntry, given: Set[str]) -> str:
+def _misfit(entry: CatalogueEntry, available: Set[str]) -> str:
     """What an observer lacks, or an empty text."""
-    missing = [name for name in entry.inputs if name not in given]
+    missing = [name for name in entry.inputs if name not in available]
     if missing:
         return f"nothing gives its input{'s' if len(missing) > 1 else ''} {', '.join(missing)}"
-    if entry.events and not set(entry.events) & given:
+    if entry.events and not set(entry.events) & available:
         return f"nothing triggers its event{'s' if len(entry.events) > 1 else ''} {', '.join(entry.events)}"
     return ""
