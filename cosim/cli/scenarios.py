@@ -25,9 +25,8 @@ def load_scenario(options: argparse.Namespace, loaded: Scenario | None = None) -
     """
     scenario = loaded or Scenario.load(options.scenario, strict=getattr(options, "strict", False))
     stated = [parse_setting(setting) for setting in options.settings]
-    for name, value in sorted(stated, key=lambda entry: entry[0] != CASE):  # what is said by name wins over a case
-        scenario.set(name, value)
-    return scenario
+    # what is said by name wins over a case
+    return scenario.with_settings(dict(sorted(stated, key=lambda entry: entry[0] != CASE)))
 
 
 def simulated_time_bar(*, silent: bool) -> ProgressBar:

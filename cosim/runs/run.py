@@ -136,10 +136,7 @@ class Run(Job):
 
     def _resolved(self) -> RunnableScenario:
         """The scenario with the settings in it."""
-        scenario = self.scenario.copy()
-        for name, value in self.settings.items():
-            scenario.set(name, value)
-        return scenario
+        return self.scenario.with_settings(self.settings)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what follows from the rest."""

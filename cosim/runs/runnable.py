@@ -39,6 +39,13 @@ class RunnableScenario(Protocol):
             name: of the value. value: what it becomes.
         """
 
+    def with_settings(self, settings: Mapping[str, Any]) -> Self:
+        """A copy with many values set.
+
+        Args:
+            settings: values by name.
+        """
+
     def table(self) -> ScenarioTable:
         """The validated scenario."""
 

@@ -55,10 +55,7 @@ class Sweep:
         Args:
             number: of the variation, from 0.
         """
-        scenario = self.scenario.copy()
-        for name, value in self.variations[number].items():
-            scenario.set(name, value)
-        return scenario
+        return self.scenario.with_settings(self.variations[number])
 
     def each(
         self, workers: int = 1, progress: Progress | None = None, scheduler: str | None = None
