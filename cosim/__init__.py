@@ -53,7 +53,7 @@ __all__ = [
     "whole",
 ]
 
-__getattr__ = lazy_imports(
+__getattr__, __dir__ = lazy_imports(
     __name__,
     {
         "Comparison": "cosim.comparison.verdict",
