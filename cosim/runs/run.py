@@ -87,7 +87,7 @@ class Run(Job):
 
     def do(self) -> Ended:
         """Run it and take what is wanted. What is doubtful is in the outcome, and not said for every run."""
-        outcome = self.scenario.run(overrides=self.settings, warn=_silent)
+        outcome = self.scenario.run(overrides=self.settings, warn=_silent, progress=False)
         reason = outcome.failure
         failure = None if reason is None else Failure(reason, outside=reason == INTERRUPTED)
         return Ended(self.take(outcome), failure)

@@ -32,13 +32,17 @@ _ORIGINS = (*COMPONENT_PATHS, *MODEL_KEYS)
 
 
 def keywords_of(table: type[TomlTable], *left_out: str) -> Callable[[F], F]:
-    """Give a method with ``**keywords`` the signature that names them, for completion and help.
+    """Give a method with ``**keywords``, or a class whose constructor has them, the signature that names them, for
+    completion and help.
 
     Args:
         table: whose keys the keywords are. left_out: keys that the method takes in another way.
     """
 
     def named(method: F) -> F:
+        if isinstance(method, type):
+            method.__doc__ = f"{method.__doc__}\n\n{named(method.__init__).__doc__}"  # type: ignore[misc]
+            return method
         signature = inspect.signature(method)
         own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
         keys = [p for name, p in table.__signature__.parameters.items() if name not in left_out]
@@ -156,8 +160,8 @@ class CallCheck:
         with self._named(place):
             path = (self.folder / (table.fmu or table.recording or ".")).resolve()
             if not path.exists():
-                error = FmuLoadError if table.fmu is not None else ScenarioError
-                raise error(f"there is no {path}; {near_files(path)}")
+                error, endings = (FmuLoadError, (".fmu",)) if table.fmu is not None else (ScenarioError, ())
+                raise error(f"there is no {path}; {near_files(path, *endings)}")
             if table.recording is not None:
                 return None
             if table.filter is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim import ssp, studies
+from cosim.errors import CosimError
 from cosim.run.outcome import Outcome
 from cosim.run.results_manifest import read_manifest
 from cosim.run.scenario_run import run_scenario
@@ -20,8 +21,11 @@ from cosim.scenario.origin import Origin
 from cosim.scenario.package_names import is_package, stem
 from cosim.scenario.saving import save_scenario, scenario_text
 from cosim.scenario.shipped import shipped_scenarios
+from cosim.simulation.scenario_screen import scenario_screen
 from cosim.simulation.stated_scenario import StatedScenario
 from cosim.structure.run_structure import Structure
+from fmus.cli.progress import SIMULATED_TIME, Progress, reported
+from fmus.tables.table import FirstScreen, Parts
 
 if TYPE_CHECKING:
     from cosim.components.recording_data import Interpolation
@@ -33,7 +37,7 @@ LOG = logging.getLogger("cosim")
 __all__ = ["Scenario", "shipped_scenarios"]
 
 
-class Scenario(StatedScenario):
+class Scenario(StatedScenario, FirstScreen):
     """A coupled system to be run, with the balises it passes and the roles of its signals.
 
     Built from a file, ``Scenario.load("freight_profile_d")`` or ``Scenario.load("my.toml")``, or step by step::
@@ -182,6 +186,15 @@ class Scenario(StatedScenario):
         """For another process: files out of a package are kept by the original, and not removed with a copy."""
         return self.__dict__ | {"_files": None}
 
+    def first_screen(self) -> Parts:
+        """What the scenario is, its components and connections; where it cannot be run yet, why."""
+        try:
+            self.table()
+            fault = ""
+        except CosimError as error:
+            fault = str(error).split("\n", 1)[0]
+        return scenario_screen(self.name, self._data, fault)
+
     def vary(
         self,
         values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]],
@@ -215,7 +228,7 @@ class Scenario(StatedScenario):
 
     def run(
         self,
-        progress: Callable[[float, float], None] | None = None,
+        progress: Progress = None,
         overrides: Mapping[str, Any] | None = None,
         warn: Callable[[str], None] | None = None,
         call_log: str | Path | None = None,
@@ -227,7 +240,8 @@ class Scenario(StatedScenario):
         """Run it.
 
         Args:
-            progress: called with the time reached and the end [s].
+            progress: called with the time reached and the end [s]; by default a bar, where the run lasts and somebody
+                can see it; False for none.
             overrides: as for `set`, for this run only.
             warn: receives everything doubtful as soon as it is known, before the run where it can be; by default the
                 log ``cosim``, which Python shows on the error stream. All warnings are in the outcome as well.
@@ -260,7 +274,8 @@ class Scenario(StatedScenario):
             origin = Origin.of(table, task.name, task.folder, task.where, self._files)
             folder, streaming = where_to(stream, fallback, origin)
             finish = ending(origin, folder, warn or LOG.warning, finished)
-            return run_scenario(task, progress, warn, log, building, streaming, self._warnings, finish)
+            with reported(progress, shape=SIMULATED_TIME) as report:
+                return run_scenario(task, report, warn, log, building, streaming, self._warnings, finish)
 
     def structure(self) -> Structure:
         """How the components hang together: order, groups, loops, what is held over a step. Nothing is run or built.

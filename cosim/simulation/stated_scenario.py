@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cosim.simulation import keywords
 
 
+@keywords_of(ScenarioTable)
 class StatedScenario:
     """A scenario as it is stated, ready to be checked as a whole.
 
@@ -44,7 +45,6 @@ class StatedScenario:
         ScenarioError: a key is unknown, or a value cannot be.
     """
 
-    @keywords_of(ScenarioTable)
     def __init__(
         self, *, folder: str | Path = ".", where: str = "script", **tables: Unpack[keywords.ScenarioKeywords]
     ) -> None:

@@ -88,7 +88,10 @@ MISTAKES: dict[str, tuple[Call, str]] = {
         r"balises: layout 'spacing' needs 'position' and 'speed'",
     ),
     "misspelt key of balises": (lambda s: s.balises(**BALISES, latncy=1.0), r"balises.latncy: .*'latency'"),
-    "latency negative": (lambda s: s.balises(**BALISES, latency=-1.0), r"balises.latency: .*equal to 0 \(got -1"),
+    "latency negative": (
+        lambda s: s.balises(**BALISES, latency=-1.0),
+        r"latency: expected at least 0 \(got -1",
+    ),
     "unknown position": (
         lambda s: s.balises(**BALISES | {"position": "train.positon"}),
         r"balises.position: train: no variable 'positon'; did you mean 'position'",
