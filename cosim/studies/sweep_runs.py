@@ -142,7 +142,9 @@ class SweepRuns(FirstScreen):
         done = f"{len(self.runs)} runs" + (f", {len(self.failed)} of which failed" if self.failed else "")
         ranges = [text for column in self.columns[:_RANGES] if (text := self._range(column))]
         sentence = f"{done}; varied: {', '.join(self.names) or 'nothing'}."
-        return [" ".join([sentence, *ranges]), self._shown(self.columns[:_MEASURES])]
+        more = len(self.columns) - _MEASURES
+        left = f"{more} more measures: see text() and to_pandas()." if more > 0 else ""
+        return [" ".join([sentence, *ranges]), self._shown(self.columns[:_MEASURES]), left]
 
     def _range(self, column: Column) -> str:
         """The smallest and the largest value of a measure and their runs, in a sentence; empty where it has none."""

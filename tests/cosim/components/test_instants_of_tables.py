@@ -292,9 +292,9 @@ def test_what_was_said_of_columns_outlives_files_and_is_shown(tmp_path: Path) ->
     """A saved scenario, `cosim show` with Jacobi, and a record of the run: the column is what it was."""
     (tmp_path / "log.csv").write_text("time,u,v\n0,1,1\n0.5,2,3\n1,2,4\n", encoding="utf-8")
     scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1, master={"algorithm": "jacobi"})
-    scenario.add("log", recording="log.csv", interpolation={"u": "hold"}).add("lag", model="lag_of_tests", **BLOCK)
     PLANTS["lag_of_tests"] = Lag
     try:
+        scenario.add("log", recording="log.csv", interpolation={"u": "hold"}).add("lag", model="lag_of_tests", **BLOCK)
         scenario.connect("log.u -> lag.a", "log.v -> lag.b")
         reported = [when(link) for link in scenario.structure().links]
         assert sorted(reported) == ["a line, its course within the step", "held, of the start of the step"]
