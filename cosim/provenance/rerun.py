@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cosim.comparison.compare import compare
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.comparison_text import comparison_parts
-from cosim.comparison.verdict import Comparison
 from cosim.errors import OutputError, ProvenanceError
 from cosim.results.load_result import load_result
 from cosim.results.unfinished import DID_NOT_END

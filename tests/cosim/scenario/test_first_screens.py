@@ -197,3 +197,11 @@ def test_a_bar_waits_until_it_is_worth_it(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_package_lists_what_it_offers(package: str) -> None:
     module = sys.modules[package]
     assert set(module.__all__) <= set(dir(module))
+
+
+def test_a_comparison_shows_its_verdict_and_the_signals_that_differ(outcome: cosim.Outcome) -> None:
+    assert fits(cosim.compare(outcome, outcome)).startswith("result agrees with reference: ")
+    other = small().set("locomotive.mass", 95e3).run(warn=lambda _: None)
+    text = fits(cosim.compare(outcome, other))
+    assert text.startswith("result DIFFERS from reference: ")
+    assert "locomotive.speed" in text
