@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,15 +38,20 @@ from plant_models.hybrid.signal import input_signal, memory, output_signal, para
 ALGORITHMS = ["gauss-seidel", "jacobi", "iterate"]
 
 
-class Lag(HybridSystem):
+class TwoInputs(HybridSystem):
+    """Two inputs in, two outputs out."""
+
+    source = "a test"
+    inputs = (input_signal("a", "1"), input_signal("b", "1"))
+    outputs = (output_signal("y", "1"), output_signal("z", "1"))
+
+
+class Lag(TwoInputs):
     """``dx/dt = rate * (a - x) + b``: an input that acts over the step, one that also passes through at once."""
 
     name = "lag"
     description = "A lag"
-    source = "a test"
     states = (state("x", "1"),)
-    inputs = (input_signal("a", "1"), input_signal("b", "1"))
-    outputs = (output_signal("y", "1"), output_signal("z", "1"))
     parameters = (parameter("rate", "1/s", 0.7),)
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
@@ -55,15 +61,13 @@ class Lag(HybridSystem):
         return {"y": x.x, "z": 0.3 * u.b + x.x}
 
 
-class Sampler(HybridSystem):
+class Sampler(TwoInputs):
     """Keeps a sample of its inputs."""
 
     name = "sampler"
     description = "A sampler"
-    source = "a test"
     states = (memory("kept", "1"),)
-    inputs = (input_signal("a", "1"), input_signal("b", "1"))
-    outputs = (output_signal("y", "1", variability="discrete"), output_signal("z", "1", variability="discrete"))
+    outputs = tuple(replace(s, variability="discrete") for s in TwoInputs.outputs)
     parameters = (parameter("period", "s", 0.2), parameter("offset", "s", 0.0))
     events = (PeriodicEvent("sample", "period", "offset"),)
 
