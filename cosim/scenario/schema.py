@@ -217,7 +217,7 @@ def _part(names: tuple[str, ...]) -> type[TomlTable]:
 
 def _in_words(error: ValidationError, where: str, at: tuple[str, ...] = ()) -> str:
     """What is wrong at a place of a scenario, or below it, a line each; empty where all of it lies elsewhere."""
-    items = [dict(item) for item in error.errors() if item["loc"][: len(at)] == at]
+    items: list[dict[str, Any]] = [dict(item) for item in error.errors() if item["loc"][: len(at)] == at]
     items = [item for item in items if not _of_another_form(item)]
     misplaced = {item["loc"][-1] for item in items if _is_misplaced(item)}
     shown = [item for item in items if (item["type"], item["loc"][-1:]) not in _missing(misplaced)]
