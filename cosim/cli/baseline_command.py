@@ -284,7 +284,7 @@ def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument
 
 
 GROUP = "Compare"
-PLACE = 3
+PLACE = 4
 HELP = "make, check and update baselines"
 EXAMPLES = (
     "cosim baseline make vendor.toml vendor.json",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -38,11 +37,11 @@ class Warnings:
     """Warnings on the error stream, a line each: the first sentence, and no more of it than a terminal is wide.
 
     Args:
-        whole: whether each is printed whole instead. before: called before each, to take a progress bar off the screen.
+        whole: whether each is printed whole instead.
     """
 
-    def __init__(self, *, whole: bool, before: Callable[[], None] = lambda: None) -> None:
-        self._whole, self._before, self._cut = whole, before, False
+    def __init__(self, *, whole: bool) -> None:
+        self._whole, self._cut = whole, False
 
     def __call__(self, text: str) -> None:
         """Print one.
@@ -52,7 +51,6 @@ class Warnings:
         """
         shown = text if self._whole else _shortened(text, sys.stderr)
         self._cut = self._cut or shown != text
-        self._before()
         print_warning(shown)
 
     def end(self) -> None:

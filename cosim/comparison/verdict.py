@@ -171,8 +171,8 @@ class EventComparison:
     compared: bool = True
 
 
-@dataclass(frozen=True, repr=False)
-class ComparisonData:
+@dataclass(frozen=True)
+class Comparison:
     """The comparison of a result with a reference.
 
     Args:

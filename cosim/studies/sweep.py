@@ -13,7 +13,7 @@ from typing import Any
 from cosim.errors import CosimError, ScenarioError
 from cosim.run.described_components import describe_component
 from cosim.run.outcome import Outcome
-from cosim.runs.engine import Done, run_jobs
+from cosim.runs.engine import Done, Progress, run_jobs
 from cosim.runs.executors import make_executor
 from cosim.runs.job import Ended, Job
 from cosim.runs.journal import Journal
@@ -23,10 +23,9 @@ from cosim.runs.runnable import RunnableScenario
 from cosim.scenario.override import CASE
 from cosim.studies.measures import Measure, error_measures, own_measures
 from cosim.studies.sampling_plans import Mode, Range, Variation, variations
-from cosim.studies.sweep_files import run_folder, write_index, write_outcome
+from cosim.studies.sweep_files import MOST_PAGES, run_folder, write_index, write_outcome
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun
-from fmus.cli.progress import Progress, Report, reported
 
 Measures = Callable[[Outcome], Mapping[str, float]]
 
@@ -56,10 +55,13 @@ class Sweep:
         Args:
             number: of the variation, from 0.
         """
-        return self.scenario.with_settings(self.variations[number])
+        scenario = self.scenario.copy()
+        for name, value in self.variations[number].items():
+            scenario.set(name, value)
+        return scenario
 
     def each(
-        self, workers: int = 1, progress: Report | None = None, scheduler: str | None = None
+        self, workers: int = 1, progress: Progress | None = None, scheduler: str | None = None
     ) -> Iterator[SweepRun]:
         """Run all variations and hand each over as soon as it is done, so that none needs to be kept.
 
@@ -86,7 +88,7 @@ class Sweep:
         self,
         workers: int = 1,
         *,
-        progress: Progress = None,
+        progress: Progress | None = None,
         measure: Mapping[str, Measure] | None = None,
         units: Mapping[str, str] | None = None,
         keep: bool = True,
@@ -102,8 +104,7 @@ class Sweep:
         Args:
             workers: processes at a time, see `each`. A script whose own classes are run in them needs
                 ``if __name__ == "__main__":``.
-            progress: called with the number done and the number in all, once a run is in the table; by default a bar,
-                where it lasts and somebody can see it; False for none.
+            progress: called with the number done and the number in all, once a run is in the table.
             measure: own numbers to take of each outcome, ``{"name": function}``; called in this process.
             units: of these numbers, by name, for pictures.
             keep: keep the outcomes in memory; without them only measures are left, and what is in `directory`.
@@ -127,14 +128,14 @@ class Sweep:
         if resume and directory is None:
             raise ScenarioError("A sweep is resumed from its folder: give directory=...")
         folder = None if directory is None else Path(directory)
-        rows = _Rows(measures, measure or {}, keep, folder, folders)
+        rows = _Rows(measures, measure or {}, keep, folder, folders, len(self.variations) <= MOST_PAGES)
         jobs = self._jobs(rows.take, code_content(measures, *rows.measure.values()))
         result = SweepResult(self.varied(0), self.names, [], dict(units or {}))  # which is whole in any case
         done: dict[int, SweepRun] = {}
-        with make_executor(workers, scheduler, apart=_apart(jobs)) as executor, reported(progress, "run") as report:
+        with make_executor(workers, scheduler, apart=_apart(jobs)) as executor:
             journal = None if folder is None else Journal(folder, resume=resume, retry=retry)
             try:
-                for each in run_jobs(jobs, executor, journal, reduce=rows.row, fits=rows.fits, progress=report):
+                for each in run_jobs(jobs, executor, journal, reduce=rows.row, fits=rows.fits, progress=progress):
                     done[each.number] = rows.run(each)
             finally:
                 result = replace(result, runs=[done[number] for number in sorted(done)])
@@ -152,7 +153,8 @@ class _Rows:
 
     Args:
         measures: taken of an outcome where it is run. measure: the user's, taken here. keep: whether outcomes stay.
-        directory: of the sweep, or None. folders: whether a results folder is written for each run.
+        directory: of the sweep, or None. folders: whether a results folder is written for each run, and pages: whether
+            with a page in it.
     """
 
     measures: Measures
@@ -160,6 +162,7 @@ class _Rows:
     keep: bool
     directory: Path | None
     folders: bool
+    pages: bool
     outcomes: dict[int, Outcome] = field(default_factory=dict)
 
     @property
@@ -179,7 +182,7 @@ class _Rows:
         own, faults = own_measures(outcome, self.measure)
         folder = run_folder(number) if self._written else None
         if self.directory is not None and folder is not None:
-            write_outcome(outcome, job.settings, self.directory / folder)
+            write_outcome(outcome, job.settings, self.directory / folder, report=self.pages)
         if self.keep:
             self.outcomes[number] = outcome
         return {"measures": {**self.measures(outcome), **own}, "faults": faults, "folder": folder}

@@ -8,33 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from cosim.components.described import DescribedComponent
 from cosim.drawing.style import OBSERVER_LINES, axes_or_new, styled
-from cosim.errors import CosimError, OutputError, nearest
-from cosim.run.described_components import describe_component
+from cosim.errors import OutputError, nearest
 from cosim.studies.measures import setting_text, with_unit
-from plant_models.hybrid.units import UnitError
+from cosim.studies.setting_units import setting_unit
 
 if TYPE_CHECKING:
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
-_SETTING_UNITS = {
-    "start": "s",
-    "stop": "s",
-    "step": "s",
-    "balises.spacing": "m",
-    "balises.first": "m",
-    "balises.min_gap": "s",
-    "balises.max_gap": "s",
-    "balises.dropout_after": "s",
-    "balises.expected_speed": "m/s",
-    "balises.location_accuracy": "m",
-    "balises.latency": "s",
-    "balises.latency_jitter": "s",
-    "balises.track_start": "m",
-    "balises.track_end": "m",
-    "report.evaluate_after": "s",
-}
 _LINES_NAMED = 8
 """More lines than these are drawn, but not named in a legend."""
 
@@ -68,28 +49,13 @@ def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax
         ax.plot(x, y, marker="o", markersize=4, label=label or None, **style)
     if ticks is not None:
         ax.set_xticks(range(len(ticks)), ticks)
-    ax.set_xlabel(with_unit(against, _setting_unit(result, against)))
+    ax.set_xlabel(with_unit(against, setting_unit(result, against)))
     ax.set_ylabel(with_unit(measure, result.unit(measure)))
     if result.failed:
         ax.set_title(f"{len(result.failed)} of {len(result.runs)} runs failed", fontsize="medium", loc="left")
     if 1 < len(groups) <= _LINES_NAMED:
         ax.legend()
     return ax
-
-
-def _setting_unit(result: SweepRuns, name: str) -> str | None:
-    """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none."""
-    component, _, variable = name.partition(".")
-    table = result.scenario.table().components.get(component)
-    if table is None:
-        return _SETTING_UNITS.get(name)
-    try:
-        described: DescribedComponent = describe_component(
-            component, table, result.scenario.folder, result.scenario.where
-        )
-        return described.unit_name(variable if variable in described.variables else f"{variable}[1]")
-    except (CosimError, KeyError, UnitError):
-        return None
 
 
 def _chosen(what: str, name: str | None, known: Sequence[str]) -> str:

@@ -10,13 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.errors import OutputError
+from cosim.report.live.render import live_page
+from cosim.report.page.page_files import page_bytes
+from cosim.studies.sweep_page import sweep_page
 from fmus.tables.plain_data import jsonable
 
 if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
-_INDEX_CSV, _INDEX_JSON, PICTURE = "index.csv", "index.json", "sweep.png"
+_INDEX_CSV, _INDEX_JSON, PAGE = "index.csv", "index.json", "index.html"
+MOST_PAGES = 60
+"""Runs of a sweep up to which each has a page of its own; of others `cosim open` makes it."""
 
 
 def run_folder(number: int) -> str:
@@ -28,20 +33,20 @@ def run_folder(number: int) -> str:
     return f"run_{number:03d}"
 
 
-def write_outcome(outcome: Outcome, settings: Mapping[str, Any], folder: Path) -> None:
+def write_outcome(outcome: Outcome, settings: Mapping[str, Any], folder: Path, *, report: bool) -> None:
     """Write the results of a run.
 
     Args:
-        outcome: of the run. settings: that were changed. folder: of this run.
+        outcome: of the run. settings: that were changed. folder: of this run. report: whether its page is written.
 
     Raises:
         OutputError: the folder cannot be written.
     """
-    outcome.with_summary(sweep_settings=dict(settings)).write(folder, report=False)
+    outcome.with_summary(sweep_settings=dict(settings)).write(folder, report=report)
 
 
 def write_sweep(result: SweepRuns, directory: Path) -> dict[str, Path]:
-    """Write all runs that are in memory, the index and a picture; paths by kind.
+    """Write all runs that are in memory, the index and a page; paths by kind.
 
     Args:
         result: the runs.
@@ -54,12 +59,13 @@ def write_sweep(result: SweepRuns, directory: Path) -> dict[str, Path]:
     for place, run in enumerate(runs):
         if run.outcome is not None:
             runs[place] = replace(run, folder=directory / run_folder(run.number))
-            write_outcome(run.outcome, run.settings, directory / run_folder(run.number))
+            folder = directory / run_folder(run.number)
+            write_outcome(run.outcome, run.settings, folder, report=len(runs) <= MOST_PAGES)
     return write_index(replace(result, runs=runs), directory)
 
 
 def write_index(result: SweepRuns, directory: Path) -> dict[str, Path]:
-    """Write the table as CSV and JSON, and a picture where there is something to draw; paths by kind.
+    """Write the table as CSV, as JSON and as a page to explore; paths by kind.
 
     Args:
         result: the runs.
@@ -79,14 +85,8 @@ def write_index(result: SweepRuns, directory: Path) -> dict[str, Path]:
             "runs": [_entry(r, directory) for r in result.runs],
         }
         paths["json"].write_text(json.dumps(jsonable(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        if _worth_drawing(result):
-            from cosim.studies.sweep_drawing import sweep_figure  # noqa: PLC0415 - matplotlib only for those who draw
-
-            figure: Any = sweep_figure(result, None, None, None).figure
-            paths["picture"] = directory / PICTURE
-            figure.savefig(paths["picture"], dpi=120)
-        else:
-            (directory / PICTURE).unlink(missing_ok=True)  # of an earlier sweep
+        paths["page"] = directory / PAGE
+        paths["page"].write_bytes(page_bytes(live_page(sweep_page(result, directory))))
     except OSError as error:
         raise OutputError(f"The sweep cannot be written to {directory}: {error.strerror or error}.") from error
     return paths
@@ -115,9 +115,3 @@ def _folder(run: SweepRun, directory: Path) -> str | None:
     if run.folder is None:
         return None
     return run.folder.name if run.folder.parent == directory else str(run.folder)
-
-
-def _worth_drawing(result: SweepRuns) -> bool:
-    return (
-        bool(result.measures) and len({json.dumps(jsonable(run.settings), sort_keys=True) for run in result.runs}) > 1
-    )

@@ -13,7 +13,7 @@ from cosim.studies.sweep_runs import SweepRuns
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from cosim.comparison.comparison import Comparison
+    from cosim.comparison.verdict import Comparison
 
 
 class SweepResult(SweepRuns):
@@ -58,8 +58,8 @@ class SweepResult(SweepRuns):
         return sweep_figure(self, measure, against, ax)
 
     def write(self, directory: str | Path) -> dict[str, Path]:
-        """Write a results folder for each run (``run_000``, ...), the table as ``index.csv`` and ``index.json``, and a
-        picture.
+        """Write a results folder for each run (``run_000``, ...), the table as ``index.csv`` and ``index.json``, and
+        the page ``index.html`` to explore it.
 
         Args:
             directory: the folder; created where it does not exist.

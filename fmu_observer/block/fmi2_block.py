@@ -89,7 +89,8 @@ class FMI2Block(FMIInterface, FMU2Slave):
         Args:
             kind: FMI's number of the status.
         """
-        _require_status(kind, fmi2LastSuccessfulTime, "a real one; only fmi2LastSuccessfulTime")
+        if kind != fmi2LastSuccessfulTime:
+            raise BlockError(f"status {kind} is not a real one; only fmi2LastSuccessfulTime is known.")
         return self.instance.runtime.t
 
     @refused
@@ -99,7 +100,8 @@ class FMI2Block(FMIInterface, FMU2Slave):
         Args:
             kind: FMI's number of the status.
         """
-        _require_status(kind, fmi2Terminated, "a Boolean one; only fmi2Terminated")
+        if kind != fmi2Terminated:
+            raise BlockError(f"status {kind} is not a Boolean one; only fmi2Terminated is known.")
         return self.instance.discarded
 
     # -- values -----------------------------------------------------------------------------------------------------
@@ -150,8 +152,3 @@ class FMI2Block(FMIInterface, FMU2Slave):
     freeFMUstate = FMIInterface.freeFMUState
     serializeFMUstate = FMIInterface.serializeFMUState
     deSerializeFMUstate = FMIInterface.deserializeFMUState
-
-
-def _require_status(kind: int, known: int, what: str) -> None:
-    if kind != known:
-        raise BlockError(f"status {kind} is not {what} is known.")

@@ -20,9 +20,9 @@ COARSEST, FINEST = 2**16, 2**24
 INSTANTS = 2**31 - 1
 """Steps of a column of instants."""
 _NOISE_STEPS = 256  # steps within the noise of a signal: finer ones would store chance
-_SHARE = 1e-4  # a grid whose step is larger than this share of the middle half of the values is too coarse
+_SHARE = 1e-3  # a grid whose step is larger than this share of the middle half of the values is too coarse
 _LARGEST = 1e150  # a grid over larger values would overflow
-_LEVEL = 6  # of deflate
+_LEVEL = 4  # of deflate
 _NAN, _LOW, _HIGH = 1, 2, 3
 _RELATIVE = 2.0**-21
 """Largest relative error of the upper half of the binary form."""

@@ -18,12 +18,16 @@ from cosim.report.live.live_page import Curve, LivePage, Mark, Panel, Recording
 from cosim.report.live.packed_column import INSTANTS, PackedColumn, pack
 from fmus.tables.plain_data import jsonable
 
-ROOM = 2_300_000
+ROOM = 2_200_000
 """Characters that all columns of a page may take at least."""
-ROOM_A_ROW = 26
-MOST_ROOM = 34_000_000
-REDUCED = 2000
+ROOM_A_ROW = 20
+MOST_ROOM = 30_000_000
+REDUCED_SHARE = 0.25  # of the room is for curves that are reduced
+A_PIECE = 12  # characters that a piece of such a curve takes
+FEWEST_PIECES, MOST_PIECES = 50, 1000
 """Pieces of a curve that is reduced; of each its ends and extremes are kept."""
+LONG = 200_000
+"""Rows from which a curve has an overview as well, which is drawn first."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +65,22 @@ class _Packer:
 
     def __init__(self, page: LivePage) -> None:
         rows = max((len(r.x) for r in page.recordings), default=0)
-        self.room = min(max(ROOM, ROOM_A_ROW * rows), MOST_ROOM)
+        room = min(max(ROOM, ROOM_A_ROW * rows), MOST_ROOM)
+        count = max(sum(len(r.curves) for r in page.recordings), 1)
+        pieces = int(REDUCED_SHARE * room / count / A_PIECE)
+        self.pieces = min(max(pieces, FEWEST_PIECES), MOST_PIECES)
+        self.room = float(room)
         self.blocks: list[str] = []
         self.reduced: list[str] = []
         self.packed: dict[tuple[int, str], dict[str, Any]] = {}
         self.abscissas = {id(r): self._column(pack(r.x, INSTANTS)) for r in page.recordings}
         first = {name for panel in page.panels for name in (*panel.curves, *(n for pair in panel.bands for n in pair))}
         curves = [(recording, curve) for recording in page.recordings for curve in recording.curves]
-        for recording, curve in sorted(curves, key=lambda pair: pair[1].name not in first):
-            self.packed[id(recording), curve.name] = self._curve(recording, curve)
+        ordered = sorted(curves, key=lambda pair: pair[1].name not in first)
+        packed = [pack(curve.values) for _, curve in ordered]
+        self.room = room if sum(p.size for p in packed) <= room else (1.0 - REDUCED_SHARE) * room
+        for (recording, curve), column in zip(ordered, packed, strict=True):
+            self.packed[id(recording), curve.name] = self._curve(curve, column)
 
     def recording(self, recording: Recording) -> dict[str, Any]:
         """A recording as plain data."""
@@ -79,17 +90,19 @@ class _Packer:
             "curves": [self.packed[id(recording), curve.name] for curve in recording.curves],
         }
 
-    def _curve(self, recording: Recording, curve: Curve) -> dict[str, Any]:
-        told = {name: getattr(curve, name) for name in ("name", "unit", "held", "description", "look", "label")}
-        told |= {"ascends": _ascends(curve.values)}
-        packed = pack(curve.values)
-        if packed.size <= self.room:
-            return told | self._column(packed)
-        self.reduced.append(curve.name)
-        rows = extreme_rows(curve.values, REDUCED)
-        return (
-            told | self._column(pack(curve.values[rows])) | {"rows": self._column(pack(rows.astype(float), INSTANTS))}
-        )
+    def _curve(self, curve: Curve, packed: PackedColumn) -> dict[str, Any]:
+        entry = {name: getattr(curve, name) for name in ("name", "unit", "held", "description", "look", "label")}
+        entry |= {"ascends": _ascends(curve.values)}
+        if packed.size > self.room:
+            self.reduced.append(curve.name)
+            return entry | self._extremes(curve.values)
+        overview = {"overview": self._extremes(curve.values)} if len(curve.values) >= LONG else {}
+        return entry | self._column(packed) | overview
+
+    def _extremes(self, values: np.ndarray) -> dict[str, Any]:
+        """A curve by its extremes, and the rows where they are."""
+        rows = extreme_rows(values, self.pieces)
+        return self._column(pack(values[rows])) | {"rows": self._column(pack(rows.astype(float), INSTANTS))}
 
     def _column(self, packed: PackedColumn) -> dict[str, Any]:
         self.room -= packed.size

@@ -172,7 +172,13 @@ def test_the_command_runs_all_cases_and_groups_them(tmp_path: Path, capsys: pyte
     words = ["sweep", path, "--cases", "--vary", "train.effort=1e4,5e4", "--by", "case", "--quiet", "--out", str(out)]
     assert main([*words, "--table-only"]) == 0
     assert "4 of 4 runs done" in capsys.readouterr().out
-    assert sorted(p.name for p in out.iterdir()) == ["groups.csv", "index.csv", "index.json", "runs.jsonl"]
+    assert sorted(p.name for p in out.iterdir()) == [
+        "groups.csv",
+        "index.csv",
+        "index.html",
+        "index.json",
+        "runs.jsonl",
+    ]
     assert (out / "groups.csv").read_text().startswith("case,measure,unit,mean,low,high,count\n")
     assert main([*words, "--resume"]) == 0
     assert main(["sweep", path, "--cases", "--by", "train.effort"]) == 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +120,10 @@ def test_a_sweep_in_a_folder_can_be_read_without_it(swept: SweepResult, tmp_path
     data = json.loads(paths["json"].read_text())
     assert data["varied"] == ["locomotive.mass", "balises.latency"]
     assert data["runs"][3]["settings"] == {"locomotive.mass": 110e3, "balises.latency": 0.02}
-    assert paths["picture"].read_bytes().startswith(b"\x89PNG")
+    page = paths["page"].read_text("utf-8")
+    links = [f"run_{n:03d}/report.html" for n in range(4)]
+    assert re.findall(r'<a href="([^"]*)"', page) == links
+    assert all((tmp_path / link).is_file() for link in links)
 
 
 def test_what_is_computed_stays_when_the_sweep_is_interrupted(tmp_path: Path) -> None:

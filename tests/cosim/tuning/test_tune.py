@@ -27,7 +27,7 @@ from cosim.tuning.replays import Replays
 from cosim.tuning.slopes import LikelihoodSlopes, NoSlopesError
 from cosim.tuning.study import at_bounds
 from cosim.tuning.tune import tune
-from cosim.tuning.tuning_files import convergence_figure
+from cosim.tuning.tuning_page import tuning_page
 from cosim.tuning.tuning_result import Tuning
 from fmu_observer import OBSERVERS
 from fmu_observer.design.optimisers.search_space import Bounded, SearchSpace
@@ -177,7 +177,7 @@ def test_an_interrupted_search_keeps_what_it_found_and_goes_on(tmp_path: Path, f
     drive_with_poor_guess().save(tmp_path / "drive.toml")
     overlay.write_text('include = ["drive.toml", "overlay.toml"]\n')
     assert mean_square(Scenario.load(overlay).run()) == pytest.approx(whole.after[0], rel=1e-12)
-    assert (tmp_path / "convergence.png").stat().st_size > 1000
+    assert "judging seeds" in (tmp_path / "tuning.html").read_text("utf-8")
 
 
 SOME = {
@@ -405,6 +405,9 @@ def test_a_journal_of_version_0_1_is_refused_in_words(tmp_path: Path) -> None:
         tune(light_train(), {"train.mass": (60e3, 120e3)}, cost=grew, directory=tmp_path, resume=True)
 
 
-def test_the_picture_says_what_the_cost_is(found: Tuning) -> None:
-    axes = convergence_figure(found)
-    assert (axes.get_title(), axes.get_ylabel()) == (found.cost, "Cost")
+def test_the_page_says_what_the_cost_is_and_how_the_searches_went(found: Tuning) -> None:
+    page = tuning_page(found)
+    assert page.lead == found.cost
+    curves = [curve for recording in page.recordings for curve in recording.curves if curve.name == "Best cost"]
+    assert [curve.values.tolist() for curve in curves] == [list(search.costs) for search in found.searches]
+    assert ("gain" in page.verdict.text, page.verdict.mood == "good") == (True, found.gain.low > 0.0)

@@ -64,12 +64,22 @@ class LiveCurve {
     this.whole = !entry.rows;
   }
 
+  /** Decode it: of a long curve its extremes first, see `refine`. */
   async load() {
-    this.loading ||= (async () => {
-      this.y = await decoded(this);
-      if (this.rows) this.kept = await decoded(this.rows);
-    })();
-    await this.loading;
+    await (this.loading ||= this.overview ? this.take(this.overview, this.overview.rows) : this.take(this, this.rows));
+  }
+
+  /** Decode every row that the page holds; whether there are more than before. */
+  async refine() {
+    if (!this.overview) return false;
+    this.overview = null;
+    await (this.loading = this.take(this, this.rows));
+    return true;
+  }
+
+  async take(column, rows) {
+    const [y, kept] = [await decoded(column), rows ? await decoded(rows) : null];
+    Object.assign(this, {y, kept, keptOf: null});
   }
 
   /** Abscissa of this curve, of those of its recording. */

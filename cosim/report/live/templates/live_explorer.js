@@ -25,6 +25,17 @@ class Explorer {
     new ResizeObserver(() => { if (this.panels.clientWidth !== this.width) this.redraw(); }).observe(this.panels);
     for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => this.rebuild());
     this.node.dataset.ready = "yes";
+    setTimeout(() => this.refine());
+  }
+
+  /** Replace the extremes of long curves, which are drawn first, by all their rows. */
+  async refine() {
+    for (const chart of this.charts) {
+      const found = [];
+      for (const {curve} of chart.all ?? []) found.push(await curve.refine());
+      if (found.some(Boolean)) await chart.build();
+    }
+    this.node.dataset.refined = "yes";
   }
 
   // -- what is drawn over -------------------------------------------------------------------------------------------
@@ -37,6 +48,7 @@ class Explorer {
       const curve = recording.curves.find((c) => c.name === this.axis);
       if (!curve?.ascends || !curve.whole) return null;
       await curve.load();
+      await curve.refine();
       return separated(curve.y);
     })();
   }
@@ -140,6 +152,7 @@ class Explorer {
     this.charts[isFirst ? "unshift" : "push"](chart);
     this.panels[isFirst ? "prepend" : "append"](chart.node);
     await chart.build();
+    await this.refine();
     this.listSignals();
     this.listPanels();
   }
@@ -162,7 +175,7 @@ class Explorer {
     if (!holding.length) {
       const unit = this.curvesOf(name)[0].unit, goal = this.goal.value;
       const chart = goal === "new" ? null : goal === "unit" ? this.charts.find((c) => c.isOwn && c.unit === unit) : this.charts[Number(goal)];
-      if (chart) { chart.panel.curves = [...chart.panel.curves, name]; await chart.build(); } else {
+      if (chart) { chart.panel.curves = [...chart.panel.curves, name]; await chart.build(); await this.refine(); } else {
         await this.add({title: goal === "new" ? name : `Signals [${unit}]`, curves: [name]});
         Object.assign(this.charts.at(-1), {isOwn: true, unit});
       }
@@ -300,4 +313,7 @@ class Explorer {
 }
 
 const liveNode = document.getElementById("explorer");
-if (liveNode) new Explorer(liveNode, JSON.parse(document.getElementById("live-data").textContent)).start();
+if (liveNode) {
+  liveNode.explorer = new Explorer(liveNode, JSON.parse(document.getElementById("live-data").textContent));
+  liveNode.explorer.start();
+}

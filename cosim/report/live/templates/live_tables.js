@@ -80,7 +80,7 @@ class ExploredTable {
 
   plot() {
     const finite = (column) => this.rows.map(({numbers}) => numbers[column]).filter(Number.isFinite);
-    const columns = this.names.map((_, column) => column).filter((column) => new Set(finite(column)).size > 1).slice(0, MOST_AXES);
+    const columns = this.names.map((_, column) => column).filter((column) => column && new Set(finite(column)).size > 1).slice(0, MOST_AXES);
     if (!columns.length || this.rows.length < 3) return;
     this.axes = columns.map((column) => {
       const values = finite(column);
@@ -88,7 +88,7 @@ class ExploredTable {
     });
     const plots = element("div", {className: "plots"});
     if (this.axes.length > 1) plots.append(this.parallel());
-    plots.append(this.distributions());
+    plots.append(element("details", {}, element("summary", {textContent: "Distributions"}), this.distributions()));
     this.node.prepend(plots);
   }
 
@@ -117,7 +117,7 @@ class ExploredTable {
   axis(svg, axis, x, top, bottom, i) {
     const brush = vector("rect", {x: x - 8, width: 16, y: top, height: 0, class: "brush"});
     const strip = vector("rect", {x: x - 14, width: 28, y: top - 4, height: bottom - top + 8, class: "strip"});
-    const name = this.names[axis.column], short = name.length > 22 ? `${name.slice(0, 21)}…` : name;
+    const name = this.names[axis.column], short = name.length > 24 ? `…${name.slice(-23)}` : name;
     const text = (y, content, style = "middle") => vector("text", {x, y, "text-anchor": style}, content);
     const group = vector("g", {class: "axis"}, vector("line", {x1: x, x2: x, y1: top, y2: bottom}), text(i % 2 ? 11 : 22, short), text(bottom + 14, shown(axis.low, 3)),
       vector("text", {x: x + 4, y: top + 10}, shown(axis.high, 3)), brush, strip, vector("title", {}, `${name}: drag to choose`));

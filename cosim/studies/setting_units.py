@@ -1,0 +1,50 @@
+"""Units of what a sweep varies."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cosim.components.described import DescribedComponent
+from cosim.errors import CosimError
+from cosim.run.described_components import describe_component
+from plant_models.hybrid.units import UnitError
+
+if TYPE_CHECKING:
+    from cosim.studies.sweep_runs import SweepRuns
+
+_SETTING_UNITS = {
+    "start": "s",
+    "stop": "s",
+    "step": "s",
+    "balises.spacing": "m",
+    "balises.first": "m",
+    "balises.min_gap": "s",
+    "balises.max_gap": "s",
+    "balises.dropout_after": "s",
+    "balises.expected_speed": "m/s",
+    "balises.location_accuracy": "m",
+    "balises.latency": "s",
+    "balises.latency_jitter": "s",
+    "balises.track_start": "m",
+    "balises.track_end": "m",
+    "report.evaluate_after": "s",
+}
+
+
+def setting_unit(result: SweepRuns, name: str) -> str | None:
+    """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none.
+
+    Args:
+        result: the runs. name: of the setting.
+    """
+    component, _, variable = name.partition(".")
+    table = result.scenario.table().components.get(component)
+    if table is None:
+        return _SETTING_UNITS.get(name)
+    try:
+        described: DescribedComponent = describe_component(
+            component, table, result.scenario.folder, result.scenario.where
+        )
+        return described.unit_name(variable if variable in described.variables else f"{variable}[1]")
+    except (CosimError, KeyError, UnitError):
+        return None

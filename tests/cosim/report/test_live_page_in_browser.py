@@ -1,0 +1,235 @@
+"""Live pages in a browser, from a file: zoom, cursor, legend, search, jump, difference, sort, filter, click through."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import browser
+import numpy as np
+import pytest
+from browser import DESKTOP, PHONE, check_page
+from live_pages import SPIKE, TIME, explored_page, overlaid_page, written
+from playwright.sync_api import Page
+
+from cosim.report.live.live_page import Curve, LivePage, Panel, Recording, Verdict
+
+pytestmark = pytest.mark.browser
+EXPLORER = "document.getElementById('explorer').explorer"
+
+
+@contextmanager
+def opened(page: LivePage, folder: Path, width: int = DESKTOP) -> Iterator[Page]:
+    """The page from its file; no error may be on the console."""
+    errors: list[str] = []
+    with browser.open_page(written(page, folder / "page.html"), width=width) as shown:
+        shown.on("pageerror", lambda error: errors.append(error.message))
+        shown.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
+        yield shown
+    assert errors == []
+
+
+def shown_range(page: Page) -> list[float]:
+    found: list[float] = page.evaluate(f"{EXPLORER}.range")
+    return found
+
+
+def values(page: Page) -> dict[str, str]:
+    """What the legends say at the cursor, by the text of the curve."""
+    found: dict[str, str] = page.evaluate(
+        "Object.fromEntries([...document.querySelectorAll('.entry')].map((e) => "
+        "[e.querySelector('.name').textContent, e.querySelector('.value').textContent]))"
+    )
+    return found
+
+
+def plot(page: Page, number: int = 0) -> Any:
+    place = page.locator(".u-over").nth(number).bounding_box()
+    assert place is not None
+    return place
+
+
+@pytest.mark.parametrize("width", [DESKTOP, PHONE])
+def test_pages_are_fit_for_screen_phone_and_paper(width: int, tmp_path: Path) -> None:
+    check_page(written(explored_page(), tmp_path / "page.html"))
+    with opened(explored_page(), tmp_path, width) as page:
+        assert page.locator("canvas").count() == 2
+        assert page.locator(".verdict").inner_text() == "It is good."
+
+
+def test_what_is_decoded_is_what_was_packed(tmp_path: Path) -> None:
+    odd = np.array([1.0, np.nan, np.inf, -np.inf, 1e300, -1e-300, 2.0, 3.0])
+    columns = {"a.odd": odd, "a.line": np.linspace(-5.0, 5.0, 8), "a.big": 10.0 ** np.arange(8) ** 2}
+    made = LivePage(
+        "t",
+        Verdict("v"),
+        recordings=[Recording("r", np.arange(8.0), [Curve(n, v) for n, v in columns.items()])],
+        panels=[Panel("p", list(columns))],
+    )
+    with opened(made, tmp_path) as page:
+        for name, expected in columns.items():
+            found = page.evaluate(f"Array.from({EXPLORER}.curvesOf('{name}')[0].y, String)")
+            np.testing.assert_allclose([float(v.replace("Infinity", "inf")) for v in found], expected, rtol=1e-6)
+
+
+def test_all_panels_zoom_together_and_every_row_is_drawn_then(tmp_path: Path) -> None:
+    with opened(explored_page(), tmp_path) as page:
+        place = plot(page)
+        y = place["y"] + 40
+        page.mouse.move(place["x"] + 0.6 * place["width"], y)
+        page.mouse.down()
+        page.mouse.move(place["x"] + 0.65 * place["width"], y, steps=4)
+        page.mouse.up()
+        low, high = shown_range(page)
+        assert (low, high) == pytest.approx((60.0, 65.0), abs=0.3)
+        ranges = page.evaluate(f"{EXPLORER}.charts.map((c) => [c.plot.scales.x.min, c.plot.scales.x.max])")
+        assert ranges == [[low, high]] * 2
+        rows = page.evaluate(f"{EXPLORER}.charts[0].plot.data[0].length")
+        assert rows == pytest.approx(5.0 / (TIME[1] - TIME[0]), rel=0.1)
+        page.mouse.dblclick(place["x"] + 100, y)
+        assert shown_range(page) == [0.0, 100.0]
+
+
+def test_extremes_are_drawn_at_every_zoom(tmp_path: Path) -> None:
+    with opened(explored_page(), tmp_path) as page:
+        largest = f"Math.max(...{EXPLORER}.charts[0].plot.data[1].filter(Number.isFinite))"
+        assert page.evaluate(largest) == pytest.approx(7.0, abs=1e-4)
+        for _ in range(6):
+            page.evaluate(f"{EXPLORER}.scale(0.5, {TIME[SPIKE]})")
+            assert page.evaluate(largest) == pytest.approx(7.0, abs=1e-4)
+
+
+def test_cursor_and_keys_show_values_with_units(tmp_path: Path) -> None:
+    with opened(explored_page(), tmp_path) as page:
+        place = plot(page, 1)
+        page.mouse.move(place["x"] + place["width"] / 2, place["y"] + 30)
+        found = values(page)
+        assert found["train.position"].endswith(" m")
+        assert float(found["train.position"].split()[0]) == pytest.approx(50.0, abs=0.2)
+        assert float(found["train.speed"].split()[0].replace("−", "-")) == pytest.approx(np.sin(50.0 / 3.0), abs=0.05)
+        page.locator(".plot").first.focus()
+        for key in ("+", "+", "Shift+ArrowRight", "ArrowRight"):
+            page.keyboard.press(key)
+        low, high = shown_range(page)
+        assert high - low == pytest.approx(25.0)
+        page.keyboard.press("Home")
+        assert shown_range(page) == [0.0, 100.0]
+        page.keyboard.press("n")
+        assert "spike" in page.locator("#explorer [role=status]").inner_text()
+
+
+def test_curves_are_hidden_and_signals_found_and_added(tmp_path: Path) -> None:
+    with opened(explored_page(), tmp_path) as page:
+        entry = page.locator(".entry", has_text="observer.speed")
+        entry.click()
+        assert page.locator(".entry", has_text="observer.speed").get_attribute("aria-pressed") == "false"
+        assert page.evaluate(f"{EXPLORER}.charts[0].plot.series.length") == 2  # time and one curve
+        page.get_by_label("Search signals").fill("level")
+        assert page.locator(".signal:visible").count() == 1
+        page.locator(".signal").click()
+        page.wait_for_function(f"{EXPLORER}.charts.length === 3")
+        assert page.locator("figcaption b").all_inner_texts() == ["Speed", "Way", "Signals [1]"]
+        page.get_by_label("Search signals").fill("fast")  # of its description
+        assert page.locator(".signal:visible").all_inner_texts()[0].startswith("speed")
+
+
+def test_a_mark_is_jumped_to_with_the_panel_that_it_is_about(tmp_path: Path) -> None:
+    with opened(explored_page(), tmp_path) as page:
+        page.get_by_role("button", name="The worst point").click()
+        low, high = shown_range(page)
+        assert low < TIME[SPIKE] < high
+        assert high - low < 10.0
+        page.get_by_label("Search marks").fill("wet")
+        page.locator(".marks button").click()
+        page.wait_for_function(f"{EXPLORER}.charts.length === 3")
+        low, high = shown_range(page)
+        assert low < 30.0
+        assert high > 50.0
+        assert page.locator("figcaption b").first.inner_text() == "Force"
+
+
+def test_axes_are_chosen(tmp_path: Path) -> None:
+    with opened(explored_page(), tmp_path) as page:
+        page.get_by_label("Over").select_option(label="train.position")
+        page.wait_for_function(f"{EXPLORER}.axisName() === 'Train.position [m]'")
+        page.get_by_role("button", name="Logarithmic axis, of absolute values: Speed").click()
+        page.wait_for_function(f"{EXPLORER}.charts[0].plot.scales['y m/s'].distr === 3")
+        assert page.evaluate(f"Math.min(...{EXPLORER}.charts[0].plot.data[1].filter(Number.isFinite))") > 0.0
+
+
+def test_the_difference_of_two_runs(tmp_path: Path) -> None:
+    """The second is twice the first, has every other row, and ends earlier; of a name with two units there is none."""
+    with opened(overlaid_page(), tmp_path) as page:
+        assert page.locator(".entry", has_text="train.position").count() == 2
+        assert page.evaluate(f"Object.keys({EXPLORER}.charts[1].limits)") == ["N", "kN"]
+        page.get_by_label("Show").select_option(label="difference to first")
+        page.wait_for_function("document.querySelectorAll('.entry').length === 1")
+        assert page.locator(".entry .name").inner_text() == "train.position: second − first"
+        place = plot(page)
+        page.mouse.move(place["x"] + 0.4 * place["width"], place["y"] + 30)
+        found = values(page)["train.position: second − first"]
+        assert float(found.split()[0]) == pytest.approx(40.0, abs=0.2)
+
+
+def test_tables_are_sorted_filtered_chosen_and_lead_on(tmp_path: Path) -> None:
+    (tmp_path / "other.html").write_text("<title>the run</title>", encoding="utf-8")
+    with opened(explored_page(), tmp_path) as page:
+        page.locator("details.section summary").first.click()
+        rows = page.locator(".explored tbody tr:visible th")
+        page.get_by_role("button", name="error [m/s]").click()
+        assert rows.first.inner_text() == "run 11"
+        page.get_by_role("button", name="error [m/s]").click()
+        assert rows.first.inner_text() == "run 0"
+        page.get_by_label("Filter rows").fill("gain < 3")
+        assert page.locator(".explored output").inner_text() == "3 of 12 rows"
+        page.get_by_label("Filter rows").fill("")
+        strip = page.locator(".strip").nth(1).bounding_box()  # the error, of which the upper half is chosen
+        assert strip is not None
+        page.mouse.move(strip["x"] + 10, strip["y"] + 4)
+        page.mouse.down()
+        page.mouse.move(strip["x"] + 10, strip["y"] + strip["height"] / 2)
+        page.mouse.up()
+        assert page.locator(".explored output").inner_text() == "6 of 12 rows"
+        assert page.locator(".run.out").count() == 6
+        page.get_by_role("link", name="run 0").click()
+        page.wait_for_url("**/other.html")
+
+
+def test_long_runs_open_with_their_extremes_and_are_whole_soon(tmp_path: Path) -> None:
+    time = np.arange(250_000) * 0.01
+    wave = np.sin(time / 50.0)
+    wave[123_456] = 9.0
+    made = LivePage(
+        "t", Verdict("v"), recordings=[Recording("r", time, [Curve("a.b", wave)])], panels=[Panel("p", ["a.b"])]
+    )
+    with opened(made, tmp_path) as page:
+        page.wait_for_function("document.getElementById('explorer').dataset.refined")
+        assert page.evaluate(f"{EXPLORER}.curves[0].y.length") == len(time)
+        page.evaluate(f"{EXPLORER}.zoom(1234.5, 1234.6)")
+        found = [v for v in page.evaluate(f"{EXPLORER}.charts[0].plot.data[1]") if v is not None]
+        assert max(found) == pytest.approx(9.0, abs=1e-3)
+        assert len(found) in (11, 12, 13)
+
+
+def test_dark_and_light_are_drawn(tmp_path: Path) -> None:
+    with opened(explored_page(), tmp_path) as page:
+        ink = f"{EXPLORER}.charts[0].all[0].style.stroke"
+        light = page.evaluate(ink)
+        page.emulate_media(color_scheme="dark")
+        page.wait_for_function(f"{ink} !== '{light}'")
+        page.emulate_media(color_scheme="dark", media="print")
+        page.wait_for_function(f"{ink} === '{light}'")  # paper is white
+
+
+def test_without_javascript_sentence_and_tables_are_there(tmp_path: Path) -> None:
+    file = written(explored_page(), tmp_path / "page.html")
+    context = browser._browser().new_context(java_script_enabled=False, offline=True)
+    try:
+        page = context.new_page()
+        page.goto(file.as_uri())
+        assert "need JavaScript" in page.locator("#explorer").inner_text()
+        assert page.locator("tbody tr").count() == 12
+    finally:
+        context.close()
