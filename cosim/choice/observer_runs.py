@@ -11,13 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from cosim.choice.playback import (
-    Listener,
-    ScenarioParts,
-    is_over_network,
-    needed_components,
-    playback_scenario,
-)
+from cosim.choice.playback import Listener, ScenarioParts, is_over_network, needed_components, playback_scenario
 from cosim.errors import CosimError
 from cosim.run.component_models import make_system
 from cosim.run.outcome import INTERRUPTED, Outcome

@@ -9,12 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.choice.candidates import BenchmarkCandidate, find_candidates, with_candidate
-from cosim.choice.playback import (
-    ScenarioParts,
-    find_parts,
-    playback_scenario,
-    recording_scenario,
-)
+from cosim.choice.playback import ScenarioParts, find_parts, playback_scenario, recording_scenario
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.costs import Cost
 

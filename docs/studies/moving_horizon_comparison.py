@@ -26,7 +26,8 @@ from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.observers.full_convergence import FullBaliseMovingHorizon
 from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, _moved, _seen
-from fmu_observer.observers.train.balise_odometer_ekf import ORDER, TUNABLE
+from fmu_observer.observers.train.balise_odometer_ekf import TUNABLE
+from fmu_observer.observers.train.balise_odometer_transition import ORDER
 from fmus.tables.numbers import error_number, number
 from plant_models.hybrid import input_signal, state, vector
 

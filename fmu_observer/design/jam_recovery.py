@@ -13,7 +13,7 @@ import numpy as np
 
 from fmu_observer.certificates.gap_error import matrix_powers
 from fmu_observer.certificates.matrix_exponential import small_exponential
-from fmu_observer.detection.jam_rules import doubt_limit, settled_limit
+from fmu_observer.detection.repaired_jam_rules import doubt_limit, settled_limit
 
 _NEGLIGIBLE, _LONGEST = 1e-9, 5000  # of what is left of an error; periods until then at most
 

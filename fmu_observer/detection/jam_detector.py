@@ -9,16 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fmu_observer.detection.jam_rules import (
-    ROUNDING,
-    SHARED_PARAMETERS,
-    JamVerdict,
-    Reading,
-    RepairedRules,
-    Rules,
-    certain_fault,
-    doubt_limit,
-)
+from fmu_observer.detection.jam_rules import ROUNDING, SHARED_PARAMETERS, JamVerdict, Reading, Rules
+from fmu_observer.detection.repaired_jam_rules import RepairedRules, certain_fault, doubt_limit
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
 from plant_models.hybrid.arrays import indicator
 from plant_models.hybrid.option import require_chosen

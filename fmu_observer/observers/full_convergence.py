@@ -15,8 +15,9 @@ import numpy as np
 
 from fmu_observer.formulas.moving_horizon.arrival_cost import arrival_cost_from
 from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolver
-from fmu_observer.formulas.moving_horizon.gauss_newton import WindowProblem, passed
+from fmu_observer.formulas.moving_horizon.gauss_newton import passed
 from fmu_observer.formulas.moving_horizon.real_time_iteration import WINDOW_MEMORY, Iterated, contradicted, unsettled
+from fmu_observer.formulas.moving_horizon.window_problem import WindowProblem
 from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
 from plant_models.hybrid import Array, discrete_output, memory, warning_output

@@ -22,7 +22,8 @@ from fmu_observer.observers.generic.discrete.ensemble_kalman_filter import Ensem
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter
 from fmu_observer.observers.generic.discrete.particle_filter import ParticleFilter
 from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter
-from fmu_observer.observers.train.balise_odometer_ekf import ODOMETER_ROW, BaliseOdometerEkf, transition
+from fmu_observer.observers.train.balise_odometer_ekf import ODOMETER_ROW, BaliseOdometerEkf
+from fmu_observer.observers.train.balise_odometer_transition import transition
 from fmus import Batch, cached_fmu
 from plant_models import PLANTS
 from plant_models.hybrid import HybridSystem

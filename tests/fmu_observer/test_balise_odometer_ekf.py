@@ -9,7 +9,7 @@ from observer_runner import SystemRunner
 
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.gap_findings import DECREASE, GROWTH
-from fmu_observer.observers.train.balise_odometer_ekf import transition
+from fmu_observer.observers.train.balise_odometer_transition import transition
 
 MASS, DRAG, EFFORT, PERIOD = 50e3, 800.0, 20e3, 0.1
 VALUES = {"mass": MASS, "davis_a": 0.0, "davis_b": DRAG, "davis_c": 0.0, "creep_share": 0.02, "creep_time": 15.0}

@@ -23,12 +23,7 @@ from fmu_observer.certificates.bounds import (
     printed_cdo_bound,
     worst_case,
 )
-from fmu_observer.certificates.bounds.carried import (
-    decay_proven,
-    first_component,
-    level,
-    level_of_box,
-)
+from fmu_observer.certificates.bounds.carried import decay_proven, first_component, level, level_of_box
 
 SET_D_GAIN = np.array([3.4, -3.4, -1.5])
 PRINTED_NORM = 5.0407  # of [3.4 + w1, -3.4, -1.5], as the independent implementation has it

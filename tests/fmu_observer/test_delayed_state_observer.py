@@ -12,11 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from fmu_observer.certificates.printed_bounds.network_bounds import (
-    NetworkBounds,
-    exact_predictor_delay,
-    largest_gain,
-)
+from fmu_observer.certificates.printed_bounds.network_bounds import NetworkBounds, exact_predictor_delay, largest_gain
 from fmu_observer.formulas.delay.finite_time_predictor import at_age, integral_weights, weighted
 from fmu_observer.models.known_models import find_model
 from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver

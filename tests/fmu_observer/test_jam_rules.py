@@ -16,12 +16,11 @@ from scipy.linalg import expm, solve_discrete_lyapunov
 from fmu_observer.design.jam_recovery import estimate_noise, held_position_error, recovery_bounds
 from fmu_observer.design.quasi_lpv_published import SECTION_3_3_4, SECTION_5_3_1
 from fmu_observer.detection.jam_detector import RULES, JamDetector, _PrintedRules
-from fmu_observer.detection.jam_rules import (
+from fmu_observer.detection.jam_rules import Passing, Reading
+from fmu_observer.detection.repaired_jam_rules import (
     HELD,
     TRUSTED,
     UNCONFIRMED,
-    Passing,
-    Reading,
     RepairedRules,
     _agreement_limit,
     certain_fault,

@@ -14,7 +14,8 @@ from own_condition import own_condition
 from fmu_observer.models.exhibits.cart_pendulum_model import cart_pendulum
 from fmu_observer.models.exhibits.pendulum_model import linear_pendulum
 from fmu_observer.models.filter_models import FilterModel, Known
-from fmu_observer.models.traced_system_model import Steps, find_filter_model, system_model
+from fmu_observer.models.moving_system import Steps
+from fmu_observer.models.traced_system_model import find_filter_model, system_model
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter, KalmanFilter
 from fmu_observer.observers.generic.discrete.gaussian_filter import GaussianFilter
 from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter

@@ -22,9 +22,10 @@ from fmu_observer import OBSERVERS
 from fmu_observer.formulas.moving_horizon import robust_loss
 from fmu_observer.formulas.moving_horizon.arrival_cost import arrival_cost_at
 from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolver
-from fmu_observer.formulas.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem, passed, solve
+from fmu_observer.formulas.moving_horizon.gauss_newton import passed, solve
 from fmu_observer.formulas.moving_horizon.real_time_iteration import contradicted, iterate, unsettled
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
+from fmu_observer.formulas.moving_horizon.window_problem import Limits, Moved, Seen, WindowProblem
 from fmu_observer.models.filter_models import Known, filter_model
 from fmu_observer.models.known_models import find_model
 from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver, window_observability

@@ -14,7 +14,7 @@ from fmu_observer.formulas.moving_horizon import gauss_newton
 from fmu_observer.formulas.moving_horizon.arrival_cost import arrival_cost_at
 from fmu_observer.formulas.moving_horizon.row_window import WindowRow
 from fmu_observer.observers.train.balise_moving_horizon import LAYOUT, BaliseMovingHorizon, Shared
-from fmu_observer.observers.train.balise_odometer_ekf import ORDER
+from fmu_observer.observers.train.balise_odometer_transition import ORDER
 from plant_models.hybrid import vector
 
 pytestmark = pytest.mark.foreign

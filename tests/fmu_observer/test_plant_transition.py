@@ -16,7 +16,8 @@ from shipped import shipped
 import cosim
 from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.models.known_models import MODELS
-from fmu_observer.models.traced_system_model import UNROLLED, Steps, find_filter_model, system_model
+from fmu_observer.models.moving_system import UNROLLED, Steps
+from fmu_observer.models.traced_system_model import find_filter_model, system_model
 from fmu_observer.observers.generic.discrete.ensemble_kalman_filter import EnsembleKalmanFilter
 from fmu_observer.observers.generic.discrete.extended_kalman_filter import ExtendedKalmanFilter, KalmanFilter
 from fmu_observer.observers.generic.discrete.unscented_kalman_filter import UnscentedKalmanFilter

@@ -4,17 +4,7 @@ from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from shared.jam_runs import (
-    CASES,
-    PERIOD,
-    Jams,
-    at_samples,
-    before_balises,
-    observe,
-    odometer_error,
-    readings,
-    trains,
-)
+from shared.jam_runs import CASES, PERIOD, Jams, at_samples, before_balises, observe, odometer_error, readings, trains
 from shared.sheet import Sheet
 
 CASE, NOISE = CASES["3.3.4"], 0.02

@@ -17,7 +17,8 @@ import numpy as np
 
 from fmu_observer.formulas.moving_horizon import robust_loss
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost
-from fmu_observer.formulas.moving_horizon.gauss_newton import FAR, WindowProblem
+from fmu_observer.formulas.moving_horizon.gauss_newton import FAR
+from fmu_observer.formulas.moving_horizon.window_problem import WindowProblem
 from fmu_observer.formulas.moving_horizon.window_program import Step, WindowProgram, window_program
 from fmu_observer.formulas.moving_horizon.window_stages import Stages, WindowStages, forward_substituted
 

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmu_observer.formulas.moving_horizon.arrival_cost import arrival_cost_from
-from fmu_observer.formulas.moving_horizon.gauss_newton import FAR, KEPT, WindowProblem, passed, solve
+from fmu_observer.formulas.moving_horizon.gauss_newton import FAR, KEPT, passed, solve
+from fmu_observer.formulas.moving_horizon.window_problem import WindowProblem
 from plant_models.hybrid import Array, OutputWarning, Signal, discrete_output, memory
 from plant_models.hybrid.option import require_whole
 from plant_models.hybrid.scan import enclosed

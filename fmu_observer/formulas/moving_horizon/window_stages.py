@@ -14,7 +14,7 @@ import numpy as np
 from fmu_observer.formulas.filtering.kalman import symmetric
 from fmu_observer.formulas.filtering.square_root import factor, solved_lower
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost
-from fmu_observer.formulas.moving_horizon.gauss_newton import WindowProblem
+from fmu_observer.formulas.moving_horizon.window_problem import WindowProblem
 from plant_models.hybrid import Array
 
 _Numbers = np.ndarray

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmu_observer.formulas.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
 from fmu_observer.formulas.moving_horizon.real_time_iteration import (
     MOST_PASSES,
     MOST_ROWS,
@@ -21,23 +20,20 @@ from fmu_observer.formulas.moving_horizon.real_time_iteration import (
 )
 from fmu_observer.formulas.moving_horizon.robust_loss import LOSSES, SCALES, Loss
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
+from fmu_observer.formulas.moving_horizon.window_problem import Limits, Moved, Seen, WindowProblem
 from fmu_observer.observers.innovation_gate import OFF, known_accuracy, place_deviation
 from fmu_observer.observers.train.balise_odometer_ekf import (
     BALISE_ROW,
     FIRST_DEVIATIONS,
     ODOMETER_ROW,
-    ORDER,
     OWN_PARAMETERS,
     TUNABLE,
     BaliseOdometerEkf,
-    D,
-    P,
-    V,
     estimate_of,
     estimates,
     moving_speed,
-    transition,
 )
+from fmu_observer.observers.train.balise_odometer_transition import ORDER, D, P, V, transition
 from fmu_observer.observers.train.train_signals import BALISE
 from plant_models.hybrid import Array, memory, parameter, vector, warning_output
 from plant_models.hybrid.option import require_chosen

@@ -11,19 +11,14 @@ import numpy as np
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_error import rows_of
 from fmu_observer.certificates.gap_findings import gap_finding
-from fmu_observer.formulas.filtering.kalman import (
-    correct,
-    integrated_noise,
-    log_likelihood,
-    normalised_square,
-    predicted_covariance,
-)
+from fmu_observer.formulas.filtering.kalman import correct, log_likelihood, normalised_square, predicted_covariance
 from fmu_observer.observers.evaluated_observer import GapCertified
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive_matrix
 from fmu_observer.observers.innovation_gate import place_deviation
 from fmu_observer.observers.made_for import MadeFor
 from fmu_observer.observers.model_signals import LAST_NIS, LOG_LIKELIHOOD
+from fmu_observer.observers.train.balise_odometer_transition import CREEP, ORDER, P, V, fading, transition
 from fmu_observer.observers.train.standstill import stands
 from fmu_observer.observers.train.train_resistance import rolling_drag
 from fmu_observer.observers.train.train_signals import (
@@ -39,10 +34,7 @@ from fmu_observer.observers.train.train_signals import (
 )
 from plant_models.hybrid import Array, vector
 from plant_models.hybrid.signal import Signal, discrete_output, input_signal, memory, output_signal, parameter, state
-from plant_models.railway.vehicle.resistance import GRAVITY
 
-ORDER = 4
-P, V, D, _CREEP = range(ORDER)  # places of the estimates among themselves
 VARIANCES = [f"estimate_covariance[{k}]" for k in (1, 5, 8, 10)]  # of an upper triangle
 FIRST_DEVIATIONS = (100.0, 2.0, 0.1, 0.1)  # before any measurement, [m], [m/s], [m/s2], [m/s] [ours]
 ROUNDING = 1e-9  # of times that are sums of periods
@@ -75,17 +67,6 @@ OWN_PARAMETERS = (
     parameter("reading_age", "s", 0.0, "Age of a reading when it is sampled", min=0.0),
     *TUNABLE,
 )
-
-
-class Transition(NamedTuple):
-    """What happens to the error between two events.
-
-    Attributes:
-        F: transition of the error, shape (4, 4). QN: covariance that it gets, shape (4, 4).
-    """
-
-    F: Array
-    QN: Array
 
 
 class BaliseOdometerEkf(GatedObserver, GapCertified):
@@ -190,7 +171,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             "estimated_position": x.estimated_speed,
             "estimated_speed": _free_acceleration(x, u, p),
             "estimated_disturbance": 0.0,
-            "estimated_creep": -x.estimated_creep * _fading(x.estimated_speed, p),
+            "estimated_creep": -x.estimated_creep * fading(x.estimated_speed, p),
         }
 
     def friction(self, t: Array, x: Array, u: Any, p: Any) -> Array:
@@ -286,65 +267,6 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         return tuple(s for s in self.parameters if s in TUNABLE or s.name == "odometer_period")
 
 
-def transition(elapsed: Array, speed: Array, effort: Array, p: Any) -> Transition:
-    """Transition of the error over a time, and the covariance that it gets on the way.
-
-    Dry friction holds a train that stands, whatever pulls at it: then its speed is known as well as a reading shows it,
-    and no reading says anything of position, disturbance and creep.
-
-    Args:
-        elapsed: time since the last event [s]. speed: [m/s]. effort: [N].
-    """
-    moves, fade = _moves(speed, p), np.exp(-elapsed * _fading(speed, p))
-    return Transition(_error_transition(elapsed, speed, moves, fade, p), _noise(elapsed, speed, effort, moves, fade, p))
-
-
-def _error_transition(T: Array, speed: Array, moves: Array, fade: Array, p: Any) -> Array:
-    """F over a time T [s], by a series of the drag slope to its third order, shape (4, 4)."""
-    slope = -(p.davis_b + 2.0 * p.davis_c * np.abs(speed)) / p.mass
-    z = slope * T
-    stays = moves * (1.0 + z * (1.0 + z * (0.5 + z / 6.0)))
-    once, twice = moves * T * (1.0 + z * (0.5 + z / 6.0)), moves * 0.5 * T * T * (1.0 + z / 3.0)
-    zero = 0.0 * T
-    one = 1.0 + zero
-    rows = ([one, once, twice, zero], [zero, stays, once, zero], [zero, zero, one, zero], [zero, zero, zero, fade])
-    return np.vstack([np.hstack(row) for row in rows])
-
-
-def _noise(T: Array, speed: Array, effort: Array, moves: Array, fade: Array, p: Any) -> Array:
-    """QN over a time T [s] as if there were no drag, shape (4, 4)."""
-    zero = 0.0 * T
-    by_acceleration = integrated_noise(2, T, moves * p.acceleration_density)
-    by_disturbance = integrated_noise(3, T, moves * (p.disturbance_density + _drift(speed, effort, p)))
-    driven = np.minimum(np.abs(effort) / (p.mass * p.creep_effort), 1.0)
-    creep = np.square(p.creep_share * driven * speed) * (1.0 - fade * fade)
-    unseen = (1.0 - moves) * np.square(p.odometer_deviation)
-    rows = []
-    for i in range(3):
-        shared = [by_acceleration[i, j] if max(i, j) < 2 else zero for j in range(3)]
-        shared[i] = shared[i] + (unseen if i == V else zero)
-        rows.append(np.hstack([*(by_disturbance[i, j] + shared[j] for j in range(3)), zero]))
-    return np.vstack([*rows, np.hstack([zero, zero, zero, creep])])
-
-
-def _moves(speed: Array, p: Any) -> Array:
-    """1 where the train is faster than a reading can distinguish from standing, else 0."""
-    return np.where(np.abs(speed) > p.odometer_deviation, 1.0, 0.0)
-
-
-def _fading(speed: Array, p: Any) -> Array:
-    """Rate at which a creep fades [1/s]; a wheel that stands does not creep."""
-    return 1.0 / np.where(_moves(speed, p) > 0.0, p.creep_time, p.odometer_period)
-
-
-def _drift(speed: Array, effort: Array, p: Any) -> Array:
-    """Spectral density with which the disturbance drifts since gradient and effort change [m2/s5]: twice the variance
-    over the time in which each becomes another one.
-    """
-    by_gradient = np.square(GRAVITY * p.gradient_deviation) * np.abs(speed) / p.gradient_length
-    return 2.0 * (by_gradient + np.square(p.effort_share * effort / p.mass) / p.effort_time)
-
-
 def _free_acceleration(x: Any, u: Any, p: Any) -> Array:
     """Acceleration without dry friction [m/s2]."""
     return (np.maximum(u.effort, 0.0) - rolling_drag(x.estimated_speed, p)) / p.mass + x.estimated_disturbance
@@ -361,7 +283,7 @@ def _anew(estimate: Array, P: Array, error: Array, refused_time: Array) -> tuple
             [s].
     """
     variances = [P[0, 0] + np.square(error * refused_time), *(d**2 + 0.0 * error for d in FIRST_DEVIATIONS[1:])]
-    reading = estimate[V] + estimate[_CREEP] + error
+    reading = estimate[V] + estimate[CREEP] + error
     found = [estimate[0], np.maximum(reading, 0.0), 0.0 * error, 0.0 * error]
     rows = [np.hstack([variances[i] if i == j else 0.0 * error for j in range(ORDER)]) for i in range(ORDER)]
     return found, np.vstack(rows)

@@ -30,10 +30,7 @@ from plant_models.railway.control.mode_switch import (
     Situation,
     next_level,
 )
-from plant_models.railway.control.sampled_regulator import (
-    RegulatorGains,
-    pole_placement,
-)
+from plant_models.railway.control.sampled_regulator import RegulatorGains, pole_placement
 
 
 class _Limits(NamedTuple):

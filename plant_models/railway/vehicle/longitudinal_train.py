@@ -14,12 +14,7 @@ from plant_models.hybrid.option import require_chosen
 from plant_models.hybrid.signal import Signal, input_signal, memory, output_signal, parameter, warning_output
 from plant_models.railway.adhesion.adhesion_table import STANDING_ADHESION, adhesion_coefficient
 from plant_models.railway.track.track import GradientShape, Track, ZoneAxis
-from plant_models.railway.vehicle.resistance import (
-    DAVIS_SETS,
-    DavisSet,
-    gradient_resistance,
-    moving_resistance,
-)
+from plant_models.railway.vehicle.resistance import DAVIS_SETS, DavisSet, gradient_resistance, moving_resistance
 from plant_models.railway.vehicle.train_signals import DOWNHILL_PULL, FREE_FALL, POINT_OUTPUTS, POINT_STATES
 
 

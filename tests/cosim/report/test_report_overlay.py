@@ -20,12 +20,7 @@ from cosim.drawing.style import run_line
 from cosim.errors import ComparisonError, OutputError
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import Phase, ReportSpec
-from cosim.report.figures.overlay_figures import (
-    _error_overlay,
-    _estimate_overlay,
-    _signal_figure,
-    _true_speed_figure,
-)
+from cosim.report.figures.overlay_figures import _error_overlay, _estimate_overlay, _signal_figure, _true_speed_figure
 from cosim.report.live.render import live_page
 from cosim.report.overlay.changing_signals import changing_signals
 from cosim.report.overlay.overlaid_runs import MOST_RUNS, OverlayRun, make_runs

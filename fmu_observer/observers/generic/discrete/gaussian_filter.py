@@ -15,8 +15,9 @@ import numpy as np
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.formulas.filtering.kalman import Corrected, log_likelihood, normalised_square
 from fmu_observer.models.filter_models import Known, noise_over
+from fmu_observer.models.moving_system import Steps
 from fmu_observer.models.observer_model import named_as, stacked_of
-from fmu_observer.models.traced_system_model import Source, Steps, find_filter_model
+from fmu_observer.models.traced_system_model import Source, find_filter_model
 from fmu_observer.models.unknown_values import with_unknown
 from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from fmu_observer.observers.gated_observer import GATED_EVENT, GatedObserver

@@ -13,8 +13,9 @@ from fmu_observer.certificates.finding import Finding
 from fmu_observer.formulas.filtering.kalman import decoupled
 from fmu_observer.formulas.filtering.particles import drawn
 from fmu_observer.models.filter_models import Known, noise_over
+from fmu_observer.models.moving_system import Steps
 from fmu_observer.models.observer_model import named_as, stacked_of
-from fmu_observer.models.traced_system_model import Source, Steps, find_filter_model
+from fmu_observer.models.traced_system_model import Source, find_filter_model
 from fmu_observer.observers.evaluated_observer import EvaluatedObserver
 from fmu_observer.observers.generic.discrete.arrivals import INITIALISED
 from fmu_observer.observers.generic.discrete.covariance_requirements import positive

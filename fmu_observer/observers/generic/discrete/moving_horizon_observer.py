@@ -11,7 +11,6 @@ import numpy as np
 
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.formulas.filtering.kalman import through
-from fmu_observer.formulas.moving_horizon.gauss_newton import Limits, Moved, Seen, WindowProblem
 from fmu_observer.formulas.moving_horizon.real_time_iteration import (
     MOST_PASSES,
     MOST_ROWS,
@@ -23,6 +22,7 @@ from fmu_observer.formulas.moving_horizon.real_time_iteration import (
 )
 from fmu_observer.formulas.moving_horizon.robust_loss import LOSSES, SCALES, Loss
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow
+from fmu_observer.formulas.moving_horizon.window_problem import Limits, Moved, Seen, WindowProblem
 from fmu_observer.models.filter_models import FilterModel, Known
 from fmu_observer.models.observer_model import named_as, stacked, stacked_of
 from fmu_observer.models.traced_system_model import Source

@@ -6,14 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from test_fmus.events import (
-    integrator_fmu,
-    received_integral,
-    receiver_fmu,
-    timed_fmu,
-    timed_integral,
-    triggered_fmu,
-)
+from test_fmus.events import integrator_fmu, received_integral, receiver_fmu, timed_fmu, timed_integral, triggered_fmu
 
 import cosim
 
