@@ -13,8 +13,8 @@ from plant_models.registry import lazy_imports
 if TYPE_CHECKING:
     from cosim.choice.benchmark import benchmark_observers
     from cosim.comparison.compare import compare
+    from cosim.comparison.comparison import Comparison
     from cosim.comparison.tolerance import Tolerance, Tolerances
-    from cosim.comparison.verdict import Comparison
     from cosim.errors import CosimError, UnmetError
     from cosim.provenance.rerun import rerun
     from cosim.results.load_result import load_result
@@ -53,10 +53,10 @@ __all__ = [
     "whole",
 ]
 
-__getattr__ = lazy_imports(
+__getattr__, __dir__ = lazy_imports(
     __name__,
     {
-        "Comparison": "cosim.comparison.verdict",
+        "Comparison": "cosim.comparison.comparison",
         "CosimError": "cosim.errors",
         "Outcome": "cosim.run.outcome",
         "Result": "cosim.results.result",

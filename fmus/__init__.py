@@ -34,7 +34,7 @@ __all__ = [
     "recipe",
 ]
 
-__getattr__ = lazy_imports(
+__getattr__, __dir__ = lazy_imports(
     __name__,
     {
         "RECIPES": "fmus.recipes",

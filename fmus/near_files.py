@@ -34,7 +34,8 @@ def near_files(path: Path, *endings: str) -> str:
         return f"there is no folder {folder}."
     names = sorted(p.name for p in folder.iterdir() if not p.name.startswith("."))
     fitting = [name for name in names if not endings or name.lower().endswith(endings)]
-    near = get_close_matches(path.name, fitting, _MOST, _ALIKE)
+    stems = get_close_matches(path.stem, {Path(name).stem for name in fitting}, _MOST, _ALIKE)  # endings are all alike
+    near = [name for stem in stems for name in fitting if Path(name).stem == stem][:_MOST]
     if near:
         return f"did you mean {', '.join(repr(name) for name in near)}?"
     shown = ", ".join(fitting[:8]) + (", ..." if len(fitting) > 8 else "")

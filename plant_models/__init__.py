@@ -45,6 +45,10 @@ FAULT_CAUSES: Registry[type[FaultCause]] = Registry(
 __all__ = ["FAULT_CAUSES", "PLANTS", "BaliseReader", "Driver", "Gps", "Locomotive", "Odometer", "Train"]
 
 
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

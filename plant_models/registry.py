@@ -293,8 +293,9 @@ def lazy_names(room: str) -> Callable[[str], Any]:
     return get
 
 
-def lazy_imports(room: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """A ``__getattr__`` for a package that offers names of other modules: one is imported when a name is asked for.
+def lazy_imports(room: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """A ``__getattr__`` for a package that offers names of other modules, one of which is imported when a name is asked
+    for; and a ``__dir__``, for completion, that lists what the package offers.
 
     Args:
         room: name of the package. homes: module of each name.
@@ -307,7 +308,10 @@ def lazy_imports(room: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
         setattr(sys.modules[room], name, found)
         return found
 
-    return get
+    def offered() -> list[str]:
+        return sorted(sys.modules[room].__all__)
+
+    return get, offered
 
 
 def load(target: str) -> Any:

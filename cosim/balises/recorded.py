@@ -21,6 +21,7 @@ from cosim.errors import OutputError, ScenarioError, nearest
 from cosim.results.formats.csv_dialect import csv_dialect
 from cosim.results.formats.headings import split_unit
 from cosim.results.load_result import load_result
+from cosim.results.read_once import read_once
 from cosim.results.record_rows import TELEGRAM_ROWS, TELEGRAM_UNITS, parse_outcomes, require_accuracy
 from cosim.results.result import BaliseRecord
 from cosim.results.results_folder import EVENTS
@@ -253,7 +254,7 @@ def read_layout(path: Path) -> RecordedLayout:
 
 def _read(path: Path) -> Sequence[BaliseRecord]:
     if path.is_dir() and (path / EVENTS).is_file():
-        return TELEGRAM_ROWS.read(path / EVENTS)
+        return read_once(TELEGRAM_ROWS.read, path / EVENTS)
     if path.name.endswith(EVENTS) and not path.is_file():
         raise OutputError("there is no such file.")
     if _holds_telegrams(path):

@@ -12,8 +12,8 @@ from cosim.baselines.regression import Regression, check, regression
 from cosim.baselines.subject import Subject, after_its_delivery, make_subject
 from cosim.baselines.update import Update, plan_update
 from cosim.comparison.common_change import common_changes
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.tolerance import Tolerance, Tolerances
-from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError
 
 WORST = 20

@@ -13,8 +13,8 @@ from cosim.baselines.causes import Pair, causes, same_models
 from cosim.baselines.draft import resolve, resolved, versions_of
 from cosim.baselines.model_identity import identities
 from cosim.comparison.compare import compare_results, run_differences
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.tolerance import Tolerances
-from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError, ComparisonError
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome

@@ -21,8 +21,8 @@ from cosim.baselines.baseline_files import (
 from cosim.baselines.draft import BaselineDraft, make_draft
 from cosim.baselines.recipe import Recipe
 from cosim.baselines.regression import Regression, check
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.tolerance import Tolerances
-from cosim.comparison.verdict import Comparison
 from cosim.errors import BaselineError, ComparisonError
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome

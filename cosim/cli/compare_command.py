@@ -22,7 +22,7 @@ from fmus.cli.output import Output
 
 if TYPE_CHECKING:
     from cosim.baselines import Baseline
-    from cosim.comparison.verdict import Comparison
+    from cosim.comparison.comparison import Comparison
     from cosim.results.result import Result
 
 EQUAL, _DIFFERENT = 0, 1

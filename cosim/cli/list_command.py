@@ -21,7 +21,7 @@ from fmus.catalogue import CatalogueEntry, catalogue
 from fmus.cli.commands import argument
 from fmus.cli.list_command import COLUMNS, model_data, model_tables, summary
 from fmus.cli.output import Output
-from fmus.tables.table import Table, pairs_table
+from fmus.tables.table import Parts, Table, pairs_table
 from plant_models import PLANTS
 
 KINDS = ("scenarios", "models", "observers")
@@ -133,7 +133,7 @@ def _first_screen(found: _Found, kinds: Sequence[str]) -> Output:
             "list models. By a word: cosim list balise."
         ]
     table = Table("recommended", COLUMNS, list(RECOMMENDED.items()))
-    parts = ["observers to begin with:", table, "\n".join(more)]
+    parts: Parts = ["observers to begin with:", table, "\n".join(more)]
     return Output(parts, {"recommended": dict(RECOMMENDED)} | found.data(kinds))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -37,11 +38,11 @@ class Warnings:
     """Warnings on the error stream, a line each: the first sentence, and no more of it than a terminal is wide.
 
     Args:
-        whole: whether each is printed whole instead.
+        whole: whether each is printed whole instead. before: called before each, to take a progress bar off the screen.
     """
 
-    def __init__(self, *, whole: bool) -> None:
-        self._whole, self._cut = whole, False
+    def __init__(self, *, whole: bool, before: Callable[[], None] = lambda: None) -> None:
+        self._whole, self._before, self._cut = whole, before, False
 
     def __call__(self, text: str) -> None:
         """Print one.
@@ -51,6 +52,7 @@ class Warnings:
         """
         shown = text if self._whole else _shortened(text, sys.stderr)
         self._cut = self._cut or shown != text
+        self._before()
         print_warning(shown)
 
     def end(self) -> None:

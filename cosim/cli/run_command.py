@@ -148,7 +148,7 @@ def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, cal
     """Run, with a bar."""
     directory = results.directory
     bar = simulated_time_bar(silent=options.quiet or options.json)
-    warnings = Warnings(whole=options.verbose)
+    warnings = Warnings(whole=options.verbose, before=bar.clear)
     try:
         with _kept(directory, options.stream, scenario.table().report.tables) as fallback:
             scenario.run(

@@ -11,7 +11,7 @@ from cosim.components.recording_data import Chosen, Interpolation
 from cosim.errors import ScenarioError
 from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
-from fmus.cli.progress import ProgressBar
+from fmus.cli.progress import SIMULATED_TIME, ProgressBar
 
 
 def load_scenario(options: argparse.Namespace, loaded: Scenario | None = None) -> Scenario:
@@ -25,9 +25,8 @@ def load_scenario(options: argparse.Namespace, loaded: Scenario | None = None) -
     """
     scenario = loaded or Scenario.load(options.scenario, strict=getattr(options, "strict", False))
     stated = [parse_setting(setting) for setting in options.settings]
-    for name, value in sorted(stated, key=lambda entry: entry[0] != CASE):  # what is said by name wins over a case
-        scenario.set(name, value)
-    return scenario
+    # what is said by name wins over a case
+    return scenario.with_settings(dict(sorted(stated, key=lambda entry: entry[0] != CASE)))
 
 
 def simulated_time_bar(*, silent: bool) -> ProgressBar:
@@ -36,8 +35,7 @@ def simulated_time_bar(*, silent: bool) -> ProgressBar:
     Args:
         silent: whether it stays away in any case.
     """
-    shape = "{percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s simulated, {elapsed} elapsed"
-    return ProgressBar(silent=silent, shape=shape)
+    return ProgressBar(silent=silent, shape=SIMULATED_TIME)
 
 
 def parse_setting(text: str) -> tuple[str, Any]:

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from cosim.comparison.curve_comparison import with_unit
-from cosim.comparison.verdict import Comparison, Curves, SignalComparison
+from cosim.comparison.verdict import ComparisonData, Curves, SignalComparison
 
 Kind = Literal["factor", "delay", "offset"]
 KINDS: tuple[Kind, ...] = ("factor", "delay", "offset")
@@ -58,7 +58,7 @@ class _Fit:
     """Size by which two numbers are compared: that of what is changed, not that of a factor near one."""
 
 
-def common_changes(comparison: Comparison) -> list[CommonChange]:
+def common_changes(comparison: ComparisonData) -> list[CommonChange]:
     """Changes that signals which differ share, the one that explains most signals first; each signal is in one at most.
 
     Args:
@@ -156,7 +156,7 @@ def _refined(left: Callable[[float], float], at: float, step: float) -> float:
     return at
 
 
-def _text(fit: _Fit, names: Sequence[str], comparison: Comparison) -> str:
+def _text(fit: _Fit, names: Sequence[str], comparison: ComparisonData) -> str:
     """One line for people."""
     compared = [s for s in comparison.signals if s.status != "ignored"]
     differ = comparison.failed
@@ -175,7 +175,7 @@ def _text(fit: _Fit, names: Sequence[str], comparison: Comparison) -> str:
     return f"{who} {_verb(fit, several, comparison)}{shown}{more}"
 
 
-def _verb(fit: _Fit, several: bool, comparison: Comparison) -> str:
+def _verb(fit: _Fit, several: bool, comparison: ComparisonData) -> str:
     amount = abs(fit.value)
     if fit.kind == "delay":
         word = "late" if fit.value > 0.0 else "early"
@@ -201,7 +201,7 @@ def _conversion(factor: float) -> str:
     return ""
 
 
-def _in_steps(delay: float, comparison: Comparison) -> str:
+def _in_steps(delay: float, comparison: ComparisonData) -> str:
     """The delay in steps of the reference, where it is a whole number of them."""
     times = next(s.curves.reference_time for s in comparison.failed if s.curves is not None)
     steps = delay / float(np.median(np.diff(np.unique(times))))

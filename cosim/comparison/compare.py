@@ -10,11 +10,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.curve import Curve, check_time, is_held
 from cosim.comparison.curve_comparison import Task, compare_signal
 from cosim.comparison.event_comparison import Event, compare_events, compare_telegrams
 from cosim.comparison.tolerance import Tolerance, Tolerances
-from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
+from cosim.comparison.verdict import ComparisonFinding, EventComparison, SignalComparison
 from cosim.errors import ComparisonError, nearest
 from cosim.results.load_result import load_result
 from cosim.results.result import PacketRecord, Result, SignalInfo

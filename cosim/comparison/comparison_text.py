@@ -9,7 +9,7 @@ from math import isnan, nan
 from typing import Any
 
 from cosim.comparison.common_change import common_changes
-from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
+from cosim.comparison.verdict import ComparisonData, ComparisonFinding, EventComparison, SignalComparison
 from fmus.tables.numbers import DASH
 from fmus.tables.table import Column, Parts, Table, joined, name_column, text_column
 
@@ -51,12 +51,12 @@ _NOTES_OF_EQUAL = 10
 _ALL = 10**9
 
 
-def comparison_text(comparison: Comparison, verbose: bool = False) -> str:
+def comparison_text(comparison: ComparisonData, verbose: bool = False) -> str:
     """See `comparison_parts`; as one text."""
     return joined(comparison_parts(comparison, verbose))
 
 
-def comparison_parts(comparison: Comparison, verbose: bool = False) -> Parts:
+def comparison_parts(comparison: ComparisonData, verbose: bool = False) -> Parts:
     """A comparison for people: what was different in what was run, the verdict in a line, what the differences have in
     common, how large they are, and where.
 
@@ -78,7 +78,7 @@ def comparison_parts(comparison: Comparison, verbose: bool = False) -> Parts:
     return [*above, *_symptoms(comparison, shown, shared, verbose, room), notes]
 
 
-def _head(comparison: Comparison, most: int) -> list[str]:
+def _head(comparison: ComparisonData, most: int) -> list[str]:
     """The verdict; behind the causes where something differs."""
     if comparison.equal:
         return [_headline(comparison), "\n".join(f"note: {cause}" for cause in comparison.causes[:most])]
@@ -96,7 +96,7 @@ def _worst_signals(shown: Sequence[SignalComparison], most: int) -> Table:
 
 
 def _symptoms(
-    comparison: Comparison,
+    comparison: ComparisonData,
     shown: Sequence[SignalComparison],
     shared: Mapping[str, int],
     verbose: bool,
@@ -117,7 +117,7 @@ def _symptoms(
     return [findings, *([points] if needed <= left else []), *events]
 
 
-def _shown(comparison: Comparison, verbose: bool, shared: Mapping[str, int]) -> list[SignalComparison]:
+def _shown(comparison: ComparisonData, verbose: bool, shared: Mapping[str, int]) -> list[SignalComparison]:
     failed = comparison.failed
     bad = {id(signal) for signal in failed}
     if verbose:
@@ -125,7 +125,7 @@ def _shown(comparison: Comparison, verbose: bool, shared: Mapping[str, int]) -> 
     return [s for s in failed if s.status != "differs" or _own(s, shared)]
 
 
-def _shared(comparison: Comparison) -> dict[str, int]:
+def _shared(comparison: ComparisonData) -> dict[str, int]:
     """What is so with all signals, such as a sample less at the end: text without the name of the signal, how many have
     it.
     """
@@ -138,7 +138,7 @@ def _own(signal: SignalComparison, shared: Mapping[str, int]) -> list[Comparison
     return [finding for finding in signal.findings if finding.text.removeprefix(signal.name + ": ") not in shared]
 
 
-def _headline(comparison: Comparison) -> str:
+def _headline(comparison: ComparisonData) -> str:
     statuses = [signal.status for signal in comparison.signals]
     words = {
         "equal": "equal",
@@ -205,7 +205,7 @@ def _details(signal: SignalComparison, shared: Mapping[str, int]) -> Parts:
     return ["\n".join(_findings(signal, shared)), _points(signal, shared)]
 
 
-def _events(comparison: Comparison, most: int) -> list[str]:
+def _events(comparison: ComparisonData, most: int) -> list[str]:
     """Telegrams and packets that differ, in `most` lines together at most, as far as there is one for each."""
     kinds = [("telegrams", comparison.events), ("packets", comparison.packets)]
     lists = [(what, [f"  {d.text}" for d in events.differences]) for what, events in kinds if events.differences]

@@ -171,8 +171,8 @@ class EventComparison:
     compared: bool = True
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class ComparisonData:
     """The comparison of a result with a reference.
 
     Args:

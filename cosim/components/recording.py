@@ -20,6 +20,7 @@ from cosim.components.fmi3 import FMI3Component
 from cosim.components.recording_data import Chosen, Recording, make_recording
 from cosim.errors import CosimError, CouplingError, ScenarioError
 from cosim.results.load_result import load_result
+from cosim.results.read_once import read_once
 from fmu_observer.annotated_variable import CAN_BE_MISSING, AnnotatedVariable
 from fmus.fmi.standard import TIME_TOLERANCE
 
@@ -292,7 +293,9 @@ def load_recording(
         ScenarioError: it cannot be read, or cannot be played back.
     """
     try:
-        return make_recording(load_result(path), str(path), component, name, interpolation, span, can_be_missing)
+        return make_recording(
+            read_once(load_result, path), str(path), component, name, interpolation, span, can_be_missing
+        )
     except ScenarioError as error:
         raise ScenarioError(f"{where}: {error}") from error
     except CosimError as error:

@@ -120,6 +120,20 @@ def run_line(index: int) -> dict[str, Any]:
     return {"color": colour["color"], "linestyle": dashed[(index - 1 + index // count) % len(dashed)], "linewidth": 1.5}
 
 
+class _NotebookFigure(Figure):
+    """A figure that a notebook shows where it is the value of a cell; pyplot shows only its own."""
+
+    def _repr_png_(self) -> bytes:
+        return png(self)
+
+
+class _NotebookAxes(Axes):
+    """Axes whose figure a notebook shows where they are the value of a cell."""
+
+    def _repr_png_(self) -> bytes:
+        return png(self.figure)
+
+
 def new_figure(size: tuple[float, float] = PANEL_SIZE) -> Figure:
     """An empty figure on a canvas of its own, without pyplot.
 
@@ -129,7 +143,7 @@ def new_figure(size: tuple[float, float] = PANEL_SIZE) -> Figure:
     Returns:
         The figure.
     """
-    figure = Figure(figsize=size, layout="constrained")
+    figure = _NotebookFigure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -151,7 +165,7 @@ def axes_or_new(ax: Axes | None, size: tuple[float, float] = PANEL_SIZE) -> Axes
         ax: axes, or None.
         size: width and height of a new figure [inch].
     """
-    return ax if ax is not None else new_figure(size).add_subplot()
+    return ax if ax is not None else new_figure(size).add_subplot(axes_class=_NotebookAxes)
 
 
 def png(figure: Figure | SubFigure, dpi: int = _DPI) -> bytes:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cosim.comparison.compare import compare
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.comparison_text import comparison_parts
-from cosim.comparison.verdict import Comparison
 from cosim.errors import OutputError, ProvenanceError
 from cosim.results.load_result import load_result
 from cosim.results.unfinished import DID_NOT_END
@@ -78,7 +78,7 @@ def _bits(value: object) -> object:
     return float(value).hex() if isinstance(value, float) else dict(value) if isinstance(value, dict) else value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Rerun(Readable):
     """What came out of running results again.
 

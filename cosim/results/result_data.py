@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, Literal
@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cosim.diagnostics.messages import Message
+from fmus.tables.table import SCREEN_ROWS, Column, FirstScreen, Parts, Table, name_column, text_column
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +92,20 @@ class PacketRecord:
     outcomes: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class ResultData:
-    """Everything a run leaves behind, as the readers of files return it.
+_COLUMNS = (
+    name_column("signal", "signal"),
+    text_column("unit", "unit"),
+    Column("first", "first", meaning="Value at the first row"),
+    Column("last", "last", meaning="Value at the last row"),
+    Column("smallest", "smallest"),
+    Column("largest", "largest"),
+)
+
+
+@dataclass(frozen=True, repr=False)
+class ResultData(FirstScreen, Mapping[str, np.ndarray]):
+    """Everything a run leaves behind, as the readers of files return it; a mapping from the names of the columns,
+    ``time`` first, to their values.
 
     Args:
         table: structured array, first field ``time`` [s], then one float64 field ``component.signal`` for each recorded
@@ -131,6 +143,33 @@ class ResultData:
             near = ", ".join(get_close_matches(name, names, 3)) or ", ".join(names)
             raise KeyError(f"signal {name!r} was not recorded; nearest: {near}")
         return np.asarray(self.table[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.table.dtype.names or ())
+
+    def __len__(self) -> int:
+        return len(self.table.dtype.names or ())
+
+    def first_screen(self) -> Parts:
+        """How long the result is, and its signals."""
+        rows = len(self.table)
+        span = f" from {self.time[0]:g} to {self.time[-1]:g} s" if rows else ""
+        telegrams = f", {len(self.events)} telegrams" if self.events else ""
+        sentence = f"{rows} rows{span}, {len(self) - 1} signals{telegrams}."
+        return [sentence if self.failure is None else f"{sentence} Ended early: {self.failure}", self.signals_table()]
+
+    def signals_table(self) -> Table:
+        """The first signals, with their ends and extremes in SI units."""
+        names, rows = list(self)[1:], []
+        units = {signal.name: signal.unit for signal in self.signals}
+        for name in names[:SCREEN_ROWS]:
+            values = np.asarray(self[name], dtype=float)
+            known = values[~np.isnan(values)]
+            ends = [float(values[0]), float(values[-1])] if len(values) else [None, None]
+            extremes = [float(known.min()), float(known.max())] if len(known) else [None, None]
+            rows.append([name, units.get(name, "1"), *ends, *extremes])
+        more = len(names) - len(rows)
+        return Table("signals", _COLUMNS, rows, notes=[f"... and {more} more signals"] if more else [])
 
     def info(self, name: str) -> SignalInfo:
         """What a column is.

@@ -2,29 +2,42 @@
 
 from __future__ import annotations
 
+import webbrowser
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import mkdtemp
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from cosim.errors import UnmetError
+from cosim.evaluation.error_table import error_table
+from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.evaluated import Evaluated, evaluated_table
+from cosim.report.page.run_verdict import observer_statuses, run_verdict
 from cosim.results.result import Result
-from cosim.results.results_folder import remove_report, write_results
+from cosim.results.results_folder import REPORT, remove_report, write_results
+from cosim.results.selection import selected
 from cosim.run.made_from import renewed
+from fmus.tables.table import FirstScreen, Parts, Table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from cosim.scenario.origin import Origin
 
+_WARNINGS, _LONGEST = 3, 180
+"""Warnings on the first screen, and letters of each."""
 INTERRUPTED = "The run was interrupted; what was computed so far is kept."
 """The failure of a run that somebody stopped."""
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What a run leaves.
+@dataclass(frozen=True, repr=False)
+class Outcome(FirstScreen, Mapping[str, np.ndarray]):
+    """What a run leaves; a mapping from the names of the recorded signals, ``time`` first, to their values.
 
     Args:
         result: table, events, summary.
@@ -41,6 +54,82 @@ class Outcome:
     def __getitem__(self, name: str) -> np.ndarray:
         """Values of a recorded signal, shape (rows,)."""
         return self.result[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.result)
+
+    def __len__(self) -> int:
+        return len(self.result)
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time of the rows [s], shape (rows,)."""
+        return self.result.time
+
+    def errors(self) -> Table:
+        """Errors of speed and position of every observer in every phase; without rows where there is none."""
+        return self._errors(self.spec)
+
+    def _errors(self, spec: ReportSpec) -> Table:
+        metrics = phase_metrics(self.result, spec) if len(self.time) else []
+        return error_table([m for m in metrics if m.speed or m.position], spec)
+
+    def to_pandas(self, signals: Iterable[str] | None = None) -> Any:
+        """A `pandas.DataFrame`; see `cosim.results.to_frames.to_pandas`.
+
+        Args:
+            signals: names of those wanted; all by default.
+        """
+        return self.result.to_pandas(signals)
+
+    def plot(self, *signals: str) -> Figure:
+        """Draw signals over time, those of one unit in one panel; without names the main picture of the run.
+
+        Args:
+            signals: names, or patterns such as ``*.speed``.
+
+        Returns:
+            The figure. A notebook shows it; ``.savefig(path)`` writes it.
+
+        Raises:
+            OutputError: a name or pattern fits no recorded signal; the nearest are suggested.
+        """
+        from cosim.report.figures import main_picture, signal_figure  # noqa: PLC0415 - matplotlib only for those who draw
+
+        if signals:
+            return signal_figure.signal_figure(self.result, selected(self.result, signals).signals)
+        return main_picture.main_picture(self.result, self.spec)
+
+    def open(self, directory: str | Path | None = None) -> Path:
+        """Write the page of the run and show it in the browser.
+
+        Args:
+            directory: the folder for it; a new temporary one by default.
+
+        Returns:
+            Path of the page, also where no browser can be started.
+
+        Raises:
+            OutputError: the folder cannot be written.
+        """
+        folder = Path(mkdtemp(prefix="cosim_")) if directory is None else Path(directory)
+        page: Path = _run_pages().write_report_page(self.result, self.spec, folder.absolute() / REPORT)
+        webbrowser.open(page.as_uri())
+        return page
+
+    def first_screen(self) -> Parts:
+        """How the run ended and what matters of it in a sentence; warnings; errors of the observers over the whole run,
+        or the signals.
+        """
+        statuses = observer_statuses(self.result, self.spec) if len(self.time) else []
+        verdict = run_verdict(self.result, self.spec, self.expectations, statuses)
+        warnings = [f"warning: {shorten(text, _LONGEST)}" for text in self.warnings]
+        more = [f"... and {len(warnings) - _WARNINGS} more warnings"] if len(warnings) > _WARNINGS else []
+        return [
+            f"{self.spec.title}. {verdict.text}",
+            "\n".join([*warnings[:_WARNINGS], *more]),
+            self._errors(replace(self.spec, phases=[])) or self.result.signals_table(),
+        ]
 
     @property
     def failure(self) -> str | None:
@@ -110,9 +199,14 @@ class Outcome:
         if self.origin is not None:
             paths["made_from"] = Path(directory) / "made_from" / "manifest.json"
         if report:
-            from cosim.report.page.run_page import write_report  # noqa: PLC0415 - loaded only for a report
-
-            paths["report"] = write_report(self.result, self.spec, directory, figures=figures)
+            paths["report"] = _run_pages().write_report(self.result, self.spec, directory, figures=figures)
         else:
             remove_report(directory)
         return paths
+
+
+def _run_pages() -> Any:
+    """The module that writes pages of runs, which is loaded only where one is wanted."""
+    from cosim.report.page import run_page  # noqa: PLC0415 - matplotlib is loaded only for a report
+
+    return run_page

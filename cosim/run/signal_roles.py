@@ -71,7 +71,7 @@ def _only(names: Iterable[str]) -> str | None:
 
 def _fits(name: str, role: str, components: Mapping[str, Component]) -> bool:
     try:
-        _check_signal(name, ROLES[role], components, role)
+        check_signal(name, ROLES[role], components, role)
     except CosimError:
         return False
     component, _, signal = name.partition(".")
@@ -92,13 +92,13 @@ def check_roles(table: ScenarioTable, components: Mapping[str, Component], where
     for role, unit in ROLES.items():
         name = getattr(report, role)
         if name is not None:
-            _check_signal(name, unit, components, f"{where}: report.{role}")
+            check_signal(name, unit, components, f"{where}: report.{role}")
     for name in report.observers or []:
         if name not in components:
             raise ScenarioError(f"{where}: report.observers: no component {name!r}; {nearest(name, components)}")
     for name in report.other_trains:
         for signal, role in (("position", "true_position"), ("speed", "true_speed")):
-            _check_signal(f"{name}.{signal}", ROLES[role], components, f"{where}: report.other_trains")
+            check_signal(f"{name}.{signal}", ROLES[role], components, f"{where}: report.other_trains")
     intervals = [(f"report.phases, {p.name!r}", p.start, p.end) for p in report.phases]
     intervals += [(f"report.zones, number {i}", *zone) for i, zone in enumerate(report.zones, start=1)]
     for what, start, end in intervals:
@@ -106,12 +106,21 @@ def check_roles(table: ScenarioTable, components: Mapping[str, Component], where
             raise ScenarioError(f"{where}: {what}: ends at {end:g} s, before or when it begins at {start:g} s.")
 
 
-def _check_signal(name: str, unit: str, components: Mapping[str, Component], what: str) -> None:
+def check_signal(name: str, unit: str | None, components: Mapping[str, Component], what: str) -> None:
+    """Check that a signal exists and is of a dimension.
+
+    Args:
+        name: ``component.signal``. unit: that its own can be converted to; None for any. components: by name.
+        what: place for messages.
+
+    Raises:
+        ScenarioError: it is of another dimension. CouplingError: it does not exist; the nearest names are suggested.
+    """
     component, signal = split_name(name, components, what)
     components[component].variable(signal, "output", "local")
     try:
         declared = components[component].unit(signal)
-        if declared is not None:
+        if declared is not None and unit is not None:
             conversion(declared, parse_unit(unit))
     except UnitError as error:
         raise ScenarioError(f"{what}: {name} is not in {unit} or convertible to it: {error}.") from error

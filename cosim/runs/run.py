@@ -87,7 +87,7 @@ class Run(Job):
 
     def do(self) -> Ended:
         """Run it and take what is wanted. What is doubtful is in the outcome, and not said for every run."""
-        outcome = self.scenario.run(overrides=self.settings, warn=_silent)
+        outcome = self.scenario.run(overrides=self.settings, warn=_silent, progress=False)
         reason = outcome.failure
         failure = None if reason is None else Failure(reason, outside=reason == INTERRUPTED)
         return Ended(self.take(outcome), failure)
@@ -136,10 +136,7 @@ class Run(Job):
 
     def _resolved(self) -> RunnableScenario:
         """The scenario with the settings in it."""
-        scenario = self.scenario.copy()
-        for name, value in self.settings.items():
-            scenario.set(name, value)
-        return scenario
+        return self.scenario.with_settings(self.settings)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what follows from the rest."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
     from cosim.scenario.schema import ScenarioTable
+    from fmus.cli.progress import Progress
 
 
 class RunnableScenario(Protocol):
@@ -39,12 +40,25 @@ class RunnableScenario(Protocol):
             name: of the value. value: what it becomes.
         """
 
+    def with_settings(self, settings: Mapping[str, Any]) -> Self:
+        """A copy with many values set.
+
+        Args:
+            settings: values by name.
+        """
+
     def table(self) -> ScenarioTable:
         """The validated scenario."""
 
-    def run(self, *, overrides: Mapping[str, Any] | None = None, warn: Callable[[str], None] | None = None) -> Outcome:
+    def run(
+        self,
+        *,
+        overrides: Mapping[str, Any] | None = None,
+        warn: Callable[[str], None] | None = None,
+        progress: Progress = None,
+    ) -> Outcome:
         """Run it.
 
         Args:
-            overrides: for this run only. warn: receives what is doubtful.
+            overrides: for this run only. warn: receives what is doubtful. progress: where it is reported.
         """

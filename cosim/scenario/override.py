@@ -6,10 +6,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from cosim.errors import ScenarioError, nearest
+from cosim.scenario.merging import BETWEEN_TARGETS
 from cosim.scenario.model_name import named, settings_of
 from cosim.scenario.paths import COMPONENT_PATHS, MODEL_KEYS, absolute, move_file, move_option_files
-from cosim.scenario.scenario_tables import ComponentTable
+from cosim.scenario.scenario_tables import ComponentTable, ConnectionTable
 from cosim.scenario.toml_values import plain
+from cosim.toml_table import TomlTable
 
 TABLES = ("balises", "network", "master", "report")
 COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}
@@ -24,12 +26,38 @@ def component_from_script(table: Mapping[str, Any]) -> Any:
     Args:
         table: its keys, with classes and instances in place of names.
     """
-    models = {key: named(table[key]) for key in MODEL_KEYS if key in table}
-    found = dict(table)
+    found = by_alias(ComponentTable, table)
+    models = {key: named(found[key]) for key in MODEL_KEYS if key in found}
     for model in models.values():
         for key, settings in settings_of(getattr(model, "given", "")).items():
             found[key] = {**settings, **found.get(key, {})}
     return plain(found | models)
+
+
+def connection_from_script(line: str | Mapping[str, Any], transformation: Mapping[str, Any]) -> list[Any]:
+    """A connection as items of a file: a line as it is, or a table for each of its targets where the number changes.
+
+    Args:
+        line: ``source -> target, target``, or a table. transformation: keys of a table, of those that are not stated.
+    """
+    if not isinstance(line, str):
+        return [{**plain(transformation), **plain(by_alias(ConnectionTable, line))}]
+    if not transformation:
+        return [line]
+    source, arrow, targets = line.partition("->")
+    names = BETWEEN_TARGETS.split(targets) if arrow else [""]
+    return [{"from": source.strip(), "to": name.strip(), **plain(transformation)} for name in names]
+
+
+def by_alias(table: type[TomlTable], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values under the keys of a file; a script says ``backend`` where a file says ``as``, which Python keeps for
+    itself.
+
+    Args:
+        table: whose keys they are. values: by the name of the key or of the field.
+    """
+    aliases = {name: info.alias for name, info in table.model_fields.items() if info.alias is not None}
+    return {aliases.get(name, name): value for name, value in values.items()}
 
 
 def value_from_script(name: str, value: Any) -> Any:
@@ -56,7 +84,7 @@ def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
     """Set one value.
 
     Args:
-        tables: keys of a scenario, changed in place.
+        tables: keys of a scenario, changed in place; the tables below are replaced.
         name: ``component.parameter``, ``component.key``, ``component.options.name``, ``balises.key``,
             ``network.key``, ``master.key``, ``report.key``, a top-level key such as ``stop``, or ``case``, which sets
             all that the case of that name says.
@@ -78,9 +106,11 @@ def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
     keys = _keys(tables, name)
     node = tables
     for key in keys[:-1]:
-        node = node.setdefault(key, {})
-        if not isinstance(node, dict):
+        below = node.get(key, {})
+        if not isinstance(below, dict):
             raise ScenarioError(f"cannot set {name!r}: {key!r} is no table.")
+        node[key] = dict(below)
+        node = node[key]
     node[keys[-1]] = value
     return keys
 

@@ -6,13 +6,22 @@ Unknown keys, wrong types and values out of range are refused with the place and
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from math import ulp
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, PlainValidator, SerializeAsAny, TypeAdapter, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    PlainValidator,
+    SerializeAsAny,
+    TypeAdapter,
+    ValidationError,
+    create_model,
+    model_validator,
+)
 
 from cosim.errors import ScenarioError, nearest
 from cosim.expectations.expectation import Expectation
@@ -57,6 +66,12 @@ def _adapter(kind: type[Expectation]) -> TypeAdapter[dict[str, Expectation]]:
 _ExpectationItem = Annotated[SerializeAsAny[Expectation], PlainValidator(_expectation)]
 
 
+def _step(value: float) -> float:
+    if not value > 0.0:
+        raise ValueError(f"step must be positive, got {value!r} s")
+    return value
+
+
 class ScenarioTable(TomlTable):
     """A whole scenario."""
 
@@ -65,7 +80,7 @@ class ScenarioTable(TomlTable):
     source: str = ""
     start: float = 0.0
     stop: float
-    step: float
+    step: Annotated[float, AfterValidator(_step)]
     seed: Seed = RUN_SEED
     tolerance: Tolerance | None = None
     certificates: Literal["warn", "require", "ignore"] = "warn"
@@ -166,10 +181,47 @@ def parse_scenario(data: dict[str, Any], where: str, folder: Path | None = None)
         if not data.get("components") and not _REQUIRED & data.keys():
             expected = "expected stop = 60.0, step = 0.01, and a table [components.NAME] for each component"
             raise ScenarioError(f"{where} holds no scenario; {expected}.") from error
-        items = [dict(item) for item in error.errors() if not _of_another_form(dict(item))]
-        misplaced = {item["loc"][-1] for item in items if _is_misplaced(item)}
-        lines = [_explain(item) for item in items if (item["type"], item["loc"][-1:]) not in _missing(misplaced)]
-        raise ScenarioError(f"{where}: " + f"\n{where}: ".join(lines)) from error
+        raise ScenarioError(_in_words(error, where)) from error
+
+
+def parse_part(data: Mapping[str, Any], where: str, folder: Path | None = None, at: tuple[str, ...] = ()) -> Any:
+    """Some keys of a scenario by themselves, validated by the same declarations as the whole.
+
+    Args:
+        data: the keys. where, folder: as for `parse_scenario`.
+        at: path of keys; faults elsewhere are not reported. All are by default.
+
+    Returns:
+        An object with these keys as attributes; None where a fault lies elsewhere.
+
+    Raises:
+        ScenarioError: with one line for each thing that is wrong.
+    """
+    known = tuple(name for name in ScenarioTable.model_fields if name in data)
+    try:
+        return _part(known).model_validate(dict(data), context={"folder": folder})
+    except ValidationError as error:
+        text = _in_words(error, where, at)
+        if text:
+            raise ScenarioError(text) from error
+    return None
+
+
+@cache
+def _part(names: tuple[str, ...]) -> type[TomlTable]:
+    """A table with these fields of a scenario alone."""
+    infos = ScenarioTable.model_fields
+    fields: dict[str, Any] = {name: (infos[name].annotation, infos[name]) for name in names}
+    return create_model("ScenarioPart", __base__=TomlTable, **fields)
+
+
+def _in_words(error: ValidationError, where: str, at: tuple[str, ...] = ()) -> str:
+    """What is wrong at a place of a scenario, or below it, a line each; empty where all of it lies elsewhere."""
+    items: list[dict[str, Any]] = [dict(item) for item in error.errors() if item["loc"][: len(at)] == at]
+    items = [item for item in items if not _of_another_form(item)]
+    misplaced = {item["loc"][-1] for item in items if _is_misplaced(item)}
+    shown = [item for item in items if (item["type"], item["loc"][-1:]) not in _missing(misplaced)]
+    return "\n".join(f"{where}: {_explain(item)}" for item in shown)
 
 
 _REQUIRED = frozenset({"stop", "step"})

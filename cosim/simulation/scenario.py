@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from copy import deepcopy
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from cosim import ssp, studies
-from cosim.errors import CosimError, ScenarioError
+from cosim.errors import CosimError
 from cosim.run.outcome import Outcome
 from cosim.run.results_manifest import read_manifest
 from cosim.run.scenario_run import run_scenario
@@ -18,15 +16,16 @@ from cosim.run.scenario_structure import scenario_structure
 from cosim.run.streaming import ending, where_to
 from cosim.run.task import RunTask
 from cosim.scenario.fmu_alone import FmuAlone, tables_of_fmu
-from cosim.scenario.includes import Key, attribute, find_file, read_tables
+from cosim.scenario.includes import find_file, read_tables
 from cosim.scenario.origin import Origin
-from cosim.scenario.override import case_values, component_from_script, override, value_from_script
 from cosim.scenario.package_names import is_package, stem
 from cosim.scenario.saving import save_scenario, scenario_text
-from cosim.scenario.schema import ScenarioTable, parse_scenario
 from cosim.scenario.shipped import shipped_scenarios
-from cosim.scenario.toml_values import plain
+from cosim.simulation.scenario_screen import scenario_screen
+from cosim.simulation.stated_scenario import StatedScenario
 from cosim.structure.run_structure import Structure
+from fmus.cli.progress import SIMULATED_TIME, Progress, reported
+from fmus.tables.table import FirstScreen, Parts
 
 if TYPE_CHECKING:
     from cosim.components.recording_data import Interpolation
@@ -38,7 +37,7 @@ LOG = logging.getLogger("cosim")
 __all__ = ["Scenario", "shipped_scenarios"]
 
 
-class Scenario:
+class Scenario(StatedScenario, FirstScreen):
     """A coupled system to be run, with the balises it passes and the roles of its signals.
 
     Built from a file, ``Scenario.load("freight_profile_d")`` or ``Scenario.load("my.toml")``, or step by step::
@@ -50,32 +49,16 @@ class Scenario:
         s.balises(position="plant.position", speed="plant.speed", layout="spacing", spacing=500.0, track_end=3000.0)
         outcome = s.run()
 
+    What a call says is checked at the call, see `StatedScenario`.
+
     Args:
         folder: folder that relative paths start from.
         where: file name for messages.
         tables: the keys of a scenario file.
+
+    Raises:
+        ScenarioError: a key is unknown, or a value cannot be.
     """
-
-    def __init__(self, *, folder: str | Path = ".", where: str = "script", **tables: Any) -> None:
-        self.folder, self.where = Path(folder), where
-        self._data: dict[str, Any] = {"components": {}, "connections": [], **deepcopy(tables)}
-        self._places: dict[Key, str] = {}  # in which file a value stands, where one file includes others
-        self._warnings: list[str] = []
-        self._name: str | None = None  # where it is not that of the file
-        self._files: object = None  # what keeps unpacked files alive
-
-    def __setattr__(self, name: str, value: object) -> None:
-        """Refuse what would have no effect, such as ``scenario.step = 0.1``.
-
-        Args:
-            name: of the attribute. value: what it becomes.
-
-        Raises:
-            AttributeError: the scenario has no such attribute.
-        """
-        if not (name.startswith("_") or name in ("folder", "where")):
-            raise AttributeError(f"A scenario has no attribute {name!r} to be set; use scenario.set({name!r}, ...).")
-        super().__setattr__(name, value)
 
     @classmethod
     def load(cls, name_or_path: str | Path, *, strict: bool = False) -> Scenario:
@@ -101,14 +84,15 @@ class Scenario:
         tables = read_tables(path)
         scenario = cls(folder=path.parent, where=str(path))
         scenario._name = None if stored is None else stored.name
-        scenario._data = {"components": {}, "connections": [], **tables.data}
+        scenario._data |= tables.data
         scenario._places = tables.places
         return scenario
 
     @classmethod
     def _from_package(cls, name: str, strict: bool) -> Scenario:
         loaded = ssp.load_package(name, strict)
-        scenario = cls(where=name, **loaded.tables)
+        scenario = cls(where=name)
+        scenario._data |= loaded.tables
         scenario._warnings, scenario._files = loaded.warnings, loaded.unpacked
         return scenario
 
@@ -198,108 +182,18 @@ class Scenario:
         """Name of the file without its ending, or ``script``."""
         return self._name or stem(self.where)
 
-    def add(self, name: str, **table: Any) -> Self:
-        """Add a component.
-
-        Args:
-            name: of the component. table: its keys as in a file: `fmu`, `model` or `observer`, `parameters`, `preset`,
-                `options`, ... `model` and `observer` take a name, ``file.py:Class``, a class, or an instance, of which
-                each run has a copy; `fmu` and `recording` a path.
-
-        Raises:
-            ScenarioError: there is a component of this name already.
-        """
-        if name in self._data["components"]:
-            raise ScenarioError(f"{self.where}: there is a component {name!r} already.")
-        self._data["components"][name] = component_from_script(table)
-        return self
-
-    def connect(self, *lines: str) -> Self:
-        """Add connections: ``"source.signal -> target.signal, target.signal"``.
-
-        Args:
-            lines: such as ``"train.speed -> observer.odometer"``.
-        """
-        self._data["connections"] = [*self._data["connections"], *lines]
-        return self
-
-    def balises(self, **table: Any) -> Self:
-        """Set keys of the balise table."""
-        self._data["balises"] = {**self._data.get("balises", {}), **table}
-        return self
-
-    def network(self, **table: Any) -> Self:
-        """Set keys of the network table: ``nodes={"front": ["odometer.reading"]}, period=0.016, delay=0.05``."""
-        self._data["network"] = {**self._data.get("network", {}), **plain(table)}
-        return self
-
-    def master(self, **table: Any) -> Self:
-        """Set keys of the master table."""
-        self._data["master"] = {**self._data.get("master", {}), **table}
-        return self
-
-    def report(self, **table: Any) -> Self:
-        """Set keys of the report table."""
-        self._data["report"] = {**self._data.get("report", {}), **table}
-        return self
-
-    def expect(self, check: str, **table: Any) -> Self:
-        """Add an expectation that the run is held against, see `cosim.expectations`.
-
-        Args:
-            check: what is checked: ``speed_error``, ``signal``, ``on``, ``telegrams``, ...
-            table: its keys as in a file; ``start`` and ``end`` may stand for ``from``, which Python keeps for itself,
-                and ``to``.
-        """
-        self._data["expect"] = [*self._data.get("expect", []), {"check": check, **table}]
-        return self
-
-    def set(self, name: str, value: Any) -> Self:
-        """Override one value.
-
-        That is ``component.parameter``, ``balises.key``, ``network.key``, ``master.key``, ``report.key``, a top-level
-        key such as ``stop``, or ``case``: all that a case of the scenario sets.
-
-        Args:
-            name: of the value. value: what it becomes; paths are relative to the working folder.
-
-        Raises:
-            ScenarioError: there is no such component or table.
-        """
-        try:
-            override(self._data, name, value_from_script(name, value))
-        except ScenarioError as error:
-            raise ScenarioError(f"{self.where}: {error}") from error
-        return self
-
-    @property
-    def cases(self) -> dict[str, dict[str, Any]]:
-        """What each case sets, by the names of `set`; ``set("case", name)`` chooses one.
-
-        Raises:
-            ScenarioError: a case is no table.
-        """
-        return {name: case_values(self._data, name) for name in self._data.get("cases") or {}}
-
-    def copy(self) -> Scenario:
-        """An independent copy."""
-        scenario = Scenario(folder=self.folder, where=self.where, **self._data)
-        scenario._warnings, scenario._files, scenario._places = list(self._warnings), self._files, self._places
-        scenario._name = self._name
-        return scenario
-
     def __getstate__(self) -> dict[str, Any]:
         """For another process: files out of a package are kept by the original, and not removed with a copy."""
         return self.__dict__ | {"_files": None}
 
-    def table(self) -> ScenarioTable:
-        """The validated scenario.
-
-        Raises:
-            ScenarioError: something in it cannot be; every fault is named.
-        """
-        with self._places_named():
-            return parse_scenario(self._data, self.where, self.folder)
+    def first_screen(self) -> Parts:
+        """What the scenario is, its components and connections; where it cannot be run yet, why."""
+        try:
+            self.table()
+            fault = ""
+        except CosimError as error:
+            fault = str(error).split("\n", 1)[0]
+        return scenario_screen(self.name, self._data, fault)
 
     def vary(
         self,
@@ -334,7 +228,7 @@ class Scenario:
 
     def run(
         self,
-        progress: Callable[[float, float], None] | None = None,
+        progress: Progress = None,
         overrides: Mapping[str, Any] | None = None,
         warn: Callable[[str], None] | None = None,
         call_log: str | Path | None = None,
@@ -346,7 +240,8 @@ class Scenario:
         """Run it.
 
         Args:
-            progress: called with the time reached and the end [s].
+            progress: called with the time reached and the end [s]; by default a bar, where the run lasts and somebody
+                can see it; False for none.
             overrides: as for `set`, for this run only.
             warn: receives everything doubtful as soon as it is known, before the run where it can be; by default the
                 log ``cosim``, which Python shows on the error stream. All warnings are in the outcome as well.
@@ -367,9 +262,7 @@ class Scenario:
         Raises:
             CosimError: the scenario cannot be set up.
         """
-        scenario = self.copy()
-        for name, value in (overrides or {}).items():
-            scenario.set(name, value)
+        scenario = self.with_settings(overrides or {})
         if call_log is not None:
             scenario.master(log_calls=True)
         table = scenario.table()
@@ -381,7 +274,8 @@ class Scenario:
             origin = Origin.of(table, task.name, task.folder, task.where, self._files)
             folder, streaming = where_to(stream, fallback, origin)
             finish = ending(origin, folder, warn or LOG.warning, finished)
-            return run_scenario(task, progress, warn, log, building, streaming, self._warnings, finish)
+            with reported(progress, shape=SIMULATED_TIME) as report:
+                return run_scenario(task, report, warn, log, building, streaming, self._warnings, finish)
 
     def structure(self) -> Structure:
         """How the components hang together: order, groups, loops, what is held over a step. Nothing is run or built.
@@ -394,12 +288,3 @@ class Scenario:
         """
         with self._places_named():
             return scenario_structure(RunTask(self.table(), self.name, self.folder, self.where))
-
-    @contextmanager
-    def _places_named(self) -> Iterator[None]:
-        """Errors name the file in which the fault stands, also where that is an included one."""
-        try:
-            yield
-        except CosimError as error:
-            error.args = (attribute(str(error), self.where, self._places), *error.args[1:])
-            raise

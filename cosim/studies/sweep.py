@@ -13,7 +13,7 @@ from typing import Any
 from cosim.errors import CosimError, ScenarioError
 from cosim.run.described_components import describe_component
 from cosim.run.outcome import Outcome
-from cosim.runs.engine import Done, Progress, run_jobs
+from cosim.runs.engine import Done, run_jobs
 from cosim.runs.executors import make_executor
 from cosim.runs.job import Ended, Job
 from cosim.runs.journal import Journal
@@ -26,6 +26,7 @@ from cosim.studies.sampling_plans import Mode, Range, Variation, variations
 from cosim.studies.sweep_files import MOST_PAGES, run_folder, write_index, write_outcome
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun
+from fmus.cli.progress import Progress, Report, reported
 
 Measures = Callable[[Outcome], Mapping[str, float]]
 
@@ -55,13 +56,10 @@ class Sweep:
         Args:
             number: of the variation, from 0.
         """
-        scenario = self.scenario.copy()
-        for name, value in self.variations[number].items():
-            scenario.set(name, value)
-        return scenario
+        return self.scenario.with_settings(self.variations[number])
 
     def each(
-        self, workers: int = 1, progress: Progress | None = None, scheduler: str | None = None
+        self, workers: int = 1, progress: Report | None = None, scheduler: str | None = None
     ) -> Iterator[SweepRun]:
         """Run all variations and hand each over as soon as it is done, so that none needs to be kept.
 
@@ -88,7 +86,7 @@ class Sweep:
         self,
         workers: int = 1,
         *,
-        progress: Progress | None = None,
+        progress: Progress = None,
         measure: Mapping[str, Measure] | None = None,
         units: Mapping[str, str] | None = None,
         keep: bool = True,
@@ -104,7 +102,8 @@ class Sweep:
         Args:
             workers: processes at a time, see `each`. A script whose own classes are run in them needs
                 ``if __name__ == "__main__":``.
-            progress: called with the number done and the number in all, once a run is in the table.
+            progress: called with the number done and the number in all, once a run is in the table; by default a bar,
+                where it lasts and somebody can see it; False for none.
             measure: own numbers to take of each outcome, ``{"name": function}``; called in this process.
             units: of these numbers, by name, for pictures.
             keep: keep the outcomes in memory; without them only measures are left, and what is in `directory`.
@@ -132,10 +131,10 @@ class Sweep:
         jobs = self._jobs(rows.take, code_content(measures, *rows.measure.values()))
         result = SweepResult(self.varied(0), self.names, [], dict(units or {}))  # which is whole in any case
         done: dict[int, SweepRun] = {}
-        with make_executor(workers, scheduler, apart=_apart(jobs)) as executor:
+        with make_executor(workers, scheduler, apart=_apart(jobs)) as executor, reported(progress, "run") as report:
             journal = None if folder is None else Journal(folder, resume=resume, retry=retry)
             try:
-                for each in run_jobs(jobs, executor, journal, reduce=rows.row, fits=rows.fits, progress=progress):
+                for each in run_jobs(jobs, executor, journal, reduce=rows.row, fits=rows.fits, progress=report):
                     done[each.number] = rows.run(each)
             finally:
                 result = replace(result, runs=[done[number] for number in sorted(done)])

@@ -13,7 +13,7 @@ from cosim.studies.sweep_runs import SweepRuns
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from cosim.comparison.verdict import Comparison
+    from cosim.comparison.comparison import Comparison
 
 
 class SweepResult(SweepRuns):

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import nan
+from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
-from cosim.errors import OutputError, ScenarioError, nearest
+from cosim.errors import ScenarioError, nearest
 from cosim.results.load_result import load_result
+from cosim.results.optional import optional_module
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome
 from cosim.runs.runnable import RunnableScenario
 from cosim.studies.measures import measure_unit, setting_text
-from fmus.tables.table import Column, Table, name_column
+from fmus.tables.numbers import number
+from fmus.tables.table import Column, FirstScreen, Parts, Table, name_column
+
+_RANGES, _MEASURES = 2, 4
+"""Measures whose range stands in the first sentence, and those whose values stand below it."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +51,8 @@ class SweepRun:
         return None if self.folder is None else load_result(self.folder)
 
 
-@dataclass(frozen=True)
-class SweepRuns:
+@dataclass(frozen=True, repr=False)
+class SweepRuns(FirstScreen):
     """The runs of a sweep, in order of its variations.
 
     Args:
@@ -117,21 +122,38 @@ class SweepRuns:
         Raises:
             OutputError: pandas is not installed.
         """
-        try:
-            import pandas as pd  # noqa: PLC0415 - optional
-        except ImportError as error:
-            raise OutputError("This needs pandas: pip install 'fmu-observer[frames]'") from error
-        return pd.DataFrame(self.table()).set_index("run")
+        return optional_module("pandas", "frames", "Data frames").DataFrame(self.table()).set_index("run")
 
     def shown(self) -> Table:
         """The settings and the chosen measures of each run, failures in words below."""
-        columns = [*(name_column(name, name, write=setting_text) for name in ("run", *self.names)), *self.columns]
+        return self._shown(self.columns)
+
+    def _shown(self, measures: Sequence[Column]) -> Table:
+        columns = [*(name_column(name, name, write=setting_text) for name in ("run", *self.names)), *measures]
         rows = [[row[column.key] for column in columns] for row in self.table()]
         return Table("runs", columns, rows, notes=self.troubles())
 
     def text(self) -> str:
         """The same as plain text."""
         return self.shown().text()
+
+    def first_screen(self) -> Parts:
+        """How many runs there are, what was varied, and between what the first of the measures lie; then the runs."""
+        done = f"{len(self.runs)} runs" + (f", {len(self.failed)} of which failed" if self.failed else "")
+        ranges = [text for column in self.columns[:_RANGES] if (text := self._range(column))]
+        sentence = f"{done}; varied: {', '.join(self.names) or 'nothing'}."
+        more = len(self.columns) - _MEASURES
+        left = f"{more} more measures: see text() and to_pandas()." if more > 0 else ""
+        return [" ".join([sentence, *ranges]), self._shown(self.columns[:_MEASURES]), left]
+
+    def _range(self, column: Column) -> str:
+        """The smallest and the largest value of a measure and their runs, in a sentence; empty where it has none."""
+        values = {run.number: v for run in self.runs if not isnan(v := run.measures.get(column.key, nan))}
+        if not values:
+            return ""
+        low, high = min(values, key=lambda n: values[n]), max(values, key=lambda n: values[n])
+        ends = [f"{number(column.factor * values[n])} in run {n}" for n in (low, high)]
+        return f"{column.title()}: from {ends[0]} to {ends[1]}."
 
     def troubles(self) -> list[str]:
         """What failed, in words, a line each."""

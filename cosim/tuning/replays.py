@@ -93,6 +93,6 @@ def make_replays(base: Scenario, observer: str, cost: Cost, settings: Sequence[s
         known = {signal.name for signal in system.parameter_signals}
         if {name.partition(".")[2] for name in settings} - known:
             return None
-        return Replays(base.run(warn=lambda _text: None), observer)
+        return Replays(base.run(warn=lambda _text: None, progress=False), observer)
     except (CosimError, ValueError):
         return None  # the master says what is wrong, where anything is

@@ -56,20 +56,20 @@ def _search(evaluations: Sequence[int], costs: Sequence[float], label: str) -> R
 
 def _verdict(tuning: Tuning) -> Verdict:
     """Whether seeds that no search has seen show a gain."""
-    gain, kind = tuning.gain, "judging" if tuning.judged else "training"
+    gain, kind = tuning.gain, "validation" if tuning.validated else "training"
     text = f"Cost {number(_mean(tuning, 0))} before, {number(_mean(tuning, 1))} after, with the {kind} seeds"
     text += f": a gain of {gain.text()}."
     if tuning.interrupted:
         return Verdict(f"{text} The search was interrupted.", "doubt")
-    if not tuning.judged:
-        return Verdict(f"{text} No seed judges it: what was learnt may be luck.", "doubt")
+    if not tuning.validated:
+        return Verdict(f"{text} No seed validates it: what was learnt may be luck.", "doubt")
     if not gain.low > 0.0:
         return Verdict(f"{text} This does not show that the scenario has become better: it may be luck.", "doubt")
     return Verdict(text, "good")
 
 
 def _mean(tuning: Tuning, after: int) -> float:
-    pairs = (tuning.judged_before, tuning.judged_after) if tuning.judged else (tuning.before, tuning.after)
+    pairs = (tuning.validated_before, tuning.validated_after) if tuning.validated else (tuning.before, tuning.after)
     return float(np.mean(pairs[after]))
 
 
@@ -77,7 +77,12 @@ def _cards(tuning: Tuning) -> list[Card]:
     finals = [s.costs[-1] for s in tuning.searches if len(s.costs)]
     cards: list[Card] = [
         ("Runs", str(tuning.runs), tuning.how, ""),
-        ("Seeds", f"{len(tuning.seeds)} training", f"{len(tuning.judged)} judging", "" if tuning.judged else "doubt"),
+        (
+            "Seeds",
+            f"{len(tuning.seeds)} training",
+            f"{len(tuning.validated)} validation",
+            "" if tuning.validated else "doubt",
+        ),
     ]
     if finals:
         spread = f"best {number(min(finals))}, worst {number(max(finals))}"
@@ -104,7 +109,7 @@ def _seeds(tuning: Tuning) -> Table:
     columns = [name_column("seed", "Seed"), Column("before", "Before", digits=4), Column("after", "After", digits=4)]
     kinds = [
         ("training", tuning.seeds, tuning.before, tuning.after),
-        ("judging", tuning.judged, tuning.judged_before, tuning.judged_after),
+        ("validation", tuning.validated, tuning.validated_before, tuning.validated_after),
     ]
     rows = [
         [f"{kind} {seed}", costs[0], costs[1]]

@@ -46,7 +46,7 @@ class Searched:
     evaluations: Sequence[int]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Tuning(Readable):
     """What came out.
 

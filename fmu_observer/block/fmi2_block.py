@@ -89,8 +89,7 @@ class FMI2Block(FMIInterface, FMU2Slave):
         Args:
             kind: FMI's number of the status.
         """
-        if kind != fmi2LastSuccessfulTime:
-            raise BlockError(f"status {kind} is not a real one; only fmi2LastSuccessfulTime is known.")
+        _require_status(kind, fmi2LastSuccessfulTime, "a real one; only fmi2LastSuccessfulTime")
         return self.instance.runtime.t
 
     @refused
@@ -100,8 +99,7 @@ class FMI2Block(FMIInterface, FMU2Slave):
         Args:
             kind: FMI's number of the status.
         """
-        if kind != fmi2Terminated:
-            raise BlockError(f"status {kind} is not a Boolean one; only fmi2Terminated is known.")
+        _require_status(kind, fmi2Terminated, "a Boolean one; only fmi2Terminated")
         return self.instance.discarded
 
     # -- values -----------------------------------------------------------------------------------------------------
@@ -152,3 +150,8 @@ class FMI2Block(FMIInterface, FMU2Slave):
     freeFMUstate = FMIInterface.freeFMUState
     serializeFMUstate = FMIInterface.serializeFMUState
     deSerializeFMUstate = FMIInterface.deserializeFMUState
+
+
+def _require_status(kind: int, known: int, what: str) -> None:
+    if kind != known:
+        raise BlockError(f"status {kind} is not {what} is known.")

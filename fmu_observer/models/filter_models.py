@@ -44,9 +44,8 @@ class FilterModel(NamedStates):
     """What a filter believes of its plant: ``x+ = f(x, u, w)``, ``y = h(x, u, v)``; Allaoui 2024, (2.25).
 
     Args:
-        name: identifier. description: one line. source: where the equations come from.
-        states: scalar signals by `state` named by the quantity; their starts are the filter's.
-        inputs: scalar signals by `input_signal`. measurements: likewise.
+        name, description, source, states, inputs: see `NamedStates`.
+        measurements: scalar signals by `input_signal`.
         parameters: signals by `parameter`, which become parameters of the filter.
         process_noises: scalar signals by `input_signal` through which noise enters the transition; none for additive
             noise on every state. measurement_noises: likewise for the measurements.
@@ -61,11 +60,6 @@ class FilterModel(NamedStates):
         ValueError: a name is no identifier or stands twice, a signal is of another kind, or nothing is measured.
     """
 
-    name: str
-    description: str
-    source: str
-    states: tuple[Signal, ...]
-    inputs: tuple[Signal, ...]
     measurements: tuple[Signal, ...]
     moved: Transition
     measured: Measured

@@ -16,15 +16,22 @@ import numpy as np
 from fmu_observer.models.checks import check_identifiers, check_numbers, check_signals, checked_matrix
 from plant_models.hybrid import Array, Signal, vector
 from plant_models.hybrid.exact_jacobian import exact_jacobian
+from plant_models.hybrid.signal import state
 
 
+@dataclass(frozen=True, eq=False)
 class NamedStates:
     """A model of n scalar states and m scalar inputs.
 
-    Attributes:
-        states: n of them. inputs: m of them.
+    Args:
+        name: identifier. description: one line. source: where the equations come from.
+        states: n scalar signals by `state`, named by the quantity (``angle``); their starts are the observer's starts.
+        inputs: m scalar signals by `input_signal`, the known inputs u.
     """
 
+    name: str
+    description: str
+    source: str
     states: tuple[Signal, ...]
     inputs: tuple[Signal, ...]
 
@@ -46,6 +53,16 @@ class NamedStates:
 
 _PROBES = 5  # states at which a phi of unknown slope is examined
 
+
+def zero_states(signals: Iterable[Signal]) -> tuple[Signal, ...]:
+    """States that start at zero, called as signals of the plant.
+
+    Args:
+        signals: scalar ones, such as outputs that show the plant's states.
+    """
+    return tuple(state(s.name, s.unit, 0.0, s.description) for s in signals)
+
+
 Remainder = Callable[[Array, Array], Array]  # (x of shape (n,), u of shape (m,)) -> shape (n,)
 
 
@@ -54,9 +71,7 @@ class ObserverModel(NamedStates):
     """What an observer believes of its plant.
 
     Args:
-        name: identifier. description: one line. source: where the equations come from.
-        states: scalar signals by `state` named by the quantity (``angle``); their starts are the observer's starts.
-        inputs: scalar signals by `input_signal`, the known inputs u.
+        name, description, source, states, inputs: see `NamedStates`.
         measurements: scalar signals by `input_signal` named by the quantity; measured continuously an observer calls
         them
             ``measured_angle``, at an event ``<event>_angle``.
@@ -78,11 +93,6 @@ class ObserverModel(NamedStates):
             is measured; the message names it.
     """
 
-    name: str
-    description: str
-    source: str
-    states: tuple[Signal, ...]
-    inputs: tuple[Signal, ...]
     measurements: tuple[Signal, ...]
     A: np.ndarray
     B: np.ndarray

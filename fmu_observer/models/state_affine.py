@@ -22,9 +22,7 @@ class StateAffineModel(NamedStates):
     """What an adaptive observer believes of its plant: Hann 2014, (4.1).
 
     Args:
-        name: identifier. description: one line. source: where the equations come from.
-        states: scalar signals by `state`, n of them; their starts are the observer's starts.
-        inputs: scalar signals by `input_signal`, the known inputs u.
+        name, description, source, states, inputs: see `NamedStates`.
         measurements: scalar signals by `input_signal`, q of them; an observer calls them ``<event>_<name>``.
         unknowns: scalar signals by `state`, the unknown constants rho, m of them; their starts are what is believed
             first.
@@ -38,11 +36,6 @@ class StateAffineModel(NamedStates):
         ValueError: a shape does not fit the signals, or a name is no identifier or stands twice.
     """
 
-    name: str
-    description: str
-    source: str
-    states: tuple[Signal, ...]
-    inputs: tuple[Signal, ...]
     measurements: tuple[Signal, ...]
     unknowns: tuple[Signal, ...]
     drift: Matrices

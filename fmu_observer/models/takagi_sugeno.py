@@ -70,9 +70,7 @@ class TakagiSugenoModel(NamedStates):
     the first premise changes fastest; h_i is the product of the memberships, and the h_i add up to one.
 
     Args:
-        name: identifier. description: one line. source: where the equations come from.
-        states: scalar signals by `state` named by the quantity; their starts are the observer's starts.
-        inputs: scalar signals by `input_signal`, the known inputs u.
+        name, description, source, states, inputs: see `NamedStates`.
         sampled: scalar signals by `input_signal` y1 that arrive at `event`; an observer calls them ``<event>_<name>``.
         continuous: scalar signals by `input_signal` y2 that are there always; an observer calls them
         ``measured_<name>``.
@@ -89,11 +87,6 @@ class TakagiSugenoModel(NamedStates):
             stands twice, or nothing is measured; the message names it.
     """
 
-    name: str
-    description: str
-    source: str
-    states: tuple[Signal, ...]
-    inputs: tuple[Signal, ...]
     sampled: tuple[Signal, ...]
     continuous: tuple[Signal, ...]
     premises: tuple[Premise, ...]

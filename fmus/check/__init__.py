@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CheckFinding", "CheckReport", "Class", "Verdict", "check_fmu"]
 
-__getattr__ = lazy_imports(
+__getattr__, __dir__ = lazy_imports(
     __name__,
     {
         "CheckReport": "fmus.check.run",

@@ -4,7 +4,8 @@ process share.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -71,6 +72,13 @@ class Context:
         return Runner(
             self.slave, self.starts, self.start_time, self.step, until=self.start_time + self.steps * self.step
         )
+
+    @contextmanager
+    def begun_runner(self) -> Iterator[Runner]:
+        """A quiet runner at the start of its run, put away at the end."""
+        with self.quiet_runner() as runner:
+            runner.begin(excited=False)
+            yield runner
 
     @cached_property
     def runner(self) -> Runner:

@@ -22,6 +22,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from fmus.cli.completion import completion_script
 from fmus.cli.output import Output
 from fmus.cli.parsers import MISTAKE, Parser, print_error
 from fmus.cli.signals import BROKEN_PIPE, forget_output
@@ -33,6 +34,7 @@ Execute = Callable[[argparse.Namespace], Output]
 """Runs a command with its options."""
 _ENDING = "_command.py"
 _DONE = 0
+_COMPLETION = "--completion"
 
 
 @dataclass(frozen=True)
@@ -194,6 +196,9 @@ class CommandProgram:
         if not words:
             print(self.first_screen())
             return _DONE
+        if list(words) == [_COMPLETION]:
+            print(self.completion(), end="")
+            return _DONE
         options = argparse.Namespace(command_line=shlex.join([self.name, *words]))
         try:  # reading the words loads the command, which may be interrupted too
             self.parser(words).parse_args(words, options)
@@ -218,6 +223,12 @@ class CommandProgram:
         more = f"All commands: {self.name} --help. Of one of them: {self.name} COMMAND --help."
         return joined([self.description, tasks, more], terminal_width())
 
+    def completion(self) -> str:
+        """The script that completes its commands in a shell; all of them are loaded for it."""
+        names = [command.name for command in find_commands(self.package)]
+        found = {name: _subparsers(self.parser([name])).choices[name] for name in names}
+        return completion_script(self.name, found)
+
     def parser(self, words: Sequence[str]) -> argparse.ArgumentParser:
         """The parser of the program; of the commands, only the one that is used is loaded.
 
@@ -227,6 +238,8 @@ class CommandProgram:
         parser = Parser(prog=self.name, description=self.description, formatter_class=argparse.RawTextHelpFormatter)
         versions = "versions of the package and of what it runs on"
         parser.add_argument("--version", action=_Version, nargs=0, help=versions)
+        shell = f'completion for bash and zsh: eval "$({self.name} {_COMPLETION})"'
+        parser.add_argument(_COMPLETION, action="store_true", help=shell)
         how = f"one of those below; '{self.name} COMMAND --help' says what it takes"
         subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help=how)
         used = next((word for word in words if not word.startswith("-")), None)
@@ -249,6 +262,11 @@ def find_commands(package: str) -> list[Command]:
     """
     files = sorted(_folder(package).glob(f"*{_ENDING}"))
     return [_declared(file.name.removesuffix(_ENDING).replace("_", "-"), file) for file in files]
+
+
+def _subparsers(parser: argparse.ArgumentParser) -> argparse._SubParsersAction[Any]:
+    """Where the parsers of commands are."""
+    return next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
 
 
 def _folder(package: str) -> Path:

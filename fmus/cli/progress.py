@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
+
+Report = Callable[[Any, Any], None]
+"""Called with how much is done and how much there is."""
+Progress = Report | bool | None
+"""Where progress is reported: a function; None or True for a bar where somebody can see one, False for nowhere."""
+SIMULATED_TIME = "{percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s simulated, {elapsed} elapsed"
+"""Shape of a bar in simulated seconds."""
+_DELAY = 1.0
+"""What is done sooner [s] needs no bar in a script."""
 
 
 class ProgressBar:
@@ -11,12 +22,12 @@ class ProgressBar:
 
     Args:
         unit: what is counted. silent: whether it stays away in any case.
-        shape: as tqdm's ``bar_format``; None for the usual one.
+        shape: as tqdm's ``bar_format``; None for the usual one. delay: time before it appears [s].
     """
 
-    def __init__(self, unit: str = "it", *, silent: bool = False, shape: str | None = None) -> None:
-        self._style = {"unit": unit, "bar_format": shape}
-        self._hidden = silent or not sys.stderr.isatty()
+    def __init__(self, unit: str = "it", *, silent: bool = False, shape: str | None = None, delay: float = 0.0) -> None:
+        self._style = {"unit": unit, "bar_format": shape, "delay": delay}
+        self._hidden = silent or not (sys.stderr.isatty() or "ipykernel" in sys.modules)
         self._bar: Any = None
 
     def __call__(self, done: float, total: float, what: str = "") -> None:
@@ -31,7 +42,7 @@ class ProgressBar:
             from tqdm import tqdm  # noqa: PLC0415 - only for those who watch
 
             self._bar = tqdm(total=total, leave=False, file=sys.stderr, **self._style)
-        self._bar.set_description_str(what)
+        self._bar.set_description_str(what, refresh=bool(what))
         self._bar.update(done - self._bar.n)
 
     def clear(self) -> None:
@@ -49,3 +60,17 @@ class ProgressBar:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+@contextmanager
+def reported(progress: Progress, unit: str = "it", shape: str | None = None) -> Iterator[Report | None]:
+    """The function that a script has its progress reported to; None where it wants none.
+
+    Args:
+        progress: as the script states it. unit, shape: of the bar, where there is one.
+    """
+    if callable(progress) or progress is False:
+        yield progress or None
+        return
+    with ProgressBar(unit, shape=shape, delay=_DELAY) as bar:
+        yield bar

@@ -14,4 +14,4 @@ if TYPE_CHECKING:
 
 __all__ = ["HostedExportError", "build_hosted_fmu"]
 
-__getattr__ = lazy_imports(__name__, dict.fromkeys(__all__, "fmus.hosted.hosted_fmu"))
+__getattr__, __dir__ = lazy_imports(__name__, dict.fromkeys(__all__, "fmus.hosted.hosted_fmu"))

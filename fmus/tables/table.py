@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from fmus.tables.notebook import paragraph_html, table_html
 from fmus.tables.numbers import error_number, number
 from fmus.tables.terminal import laid_out, paragraph
 
@@ -81,8 +82,31 @@ def error_column(key: str, heading: str, unit: str, meaning: str = "", **more: A
     return Column(key, heading, unit, meaning, write=error_number, **more)
 
 
-@dataclass(frozen=True)
-class Table:
+class FirstScreen:
+    """What shows itself on one screen, in a terminal (``repr``) and in a notebook: a sentence, then tables."""
+
+    def first_screen(self) -> Parts:
+        """What is shown, the most important first."""
+        raise NotImplementedError
+
+    def _screen(self) -> Parts:
+        return [part.first_rows(SCREEN_ROWS) if isinstance(part, Table) else part for part in self.first_screen()]
+
+    def __repr__(self) -> str:
+        lines = joined(self._screen(), SCREEN_WIDTH).splitlines()
+        more = [f"... and {len(lines) - SCREEN_LINES} more lines"] if len(lines) > SCREEN_LINES else []
+        return "\n".join([*lines[:SCREEN_LINES], *more])
+
+    def _repr_html_(self) -> str:
+        return "".join(part.html() if isinstance(part, Table) else paragraph_html(part) for part in self._screen())
+
+
+SCREEN_WIDTH, SCREEN_LINES, SCREEN_ROWS = 100, 40, 16
+"""Columns and lines of a screen, and rows of a table on it."""
+
+
+@dataclass(frozen=True, repr=False)
+class Table(FirstScreen):
     """A table.
 
     Args:
@@ -137,6 +161,30 @@ class Table:
         keys = [column.key for column in self.columns]
         return [dict(zip(keys, row, strict=True)) for row in self.rows]
 
+    def first_screen(self) -> Parts:
+        """The table itself."""
+        return [self]
+
+    def first_rows(self, most: int) -> Table:
+        """The table with its first rows, and a note that there are more.
+
+        Args:
+            most: how many rows.
+        """
+        if len(self.rows) <= most:
+            return self
+        note = f"... and {len(self.rows) - most} more rows"
+        return replace(self, rows=self.rows[:most], notes=[note, *self.notes])
+
+    def html(self) -> str:
+        """The table for a notebook: title, headings with their meanings, rows, notes; empty without rows."""
+        if not self.rows:
+            return ""
+        headings = [(column.title(), column.meaning) for column in self.columns]
+        left = [i for i, column in enumerate(self.columns) if column.kind != "number"]
+        parts = [paragraph_html(self.title), table_html(headings, self.cells, left, self.bad)]
+        return "".join([*parts, paragraph_html("\n".join(self.notes))])
+
     def text(self, width: int | None = None) -> str:
         """The table for a terminal: title, headings, rows, notes; empty without rows; ends without a line break.
 
@@ -167,8 +215,12 @@ def joined(parts: Parts, width: int | None = None) -> str:
     return "\n\n".join(filter(None, texts))
 
 
-class Readable:
+class Readable(FirstScreen):
     """What people read as tables and paragraphs."""
+
+    def first_screen(self) -> Parts:
+        """All of it, as far as it finds room."""
+        return self.parts()
 
     def parts(self) -> Parts:
         """The tables and paragraphs, in their order."""

@@ -11,7 +11,8 @@ from plant_models.disk_cache.entries import write_whole
 SETTLED = 2.0
 """A file changed less than this ago [s] may change again without a trace in its time stamps."""
 
-Stamp = tuple[int, ...]
+Stamp = tuple[int, int, int, int, int]
+"""Device, number, size [bytes], and times of the last change of content and of state [ns] of a file."""
 _known: dict[Path, tuple[Stamp, str]] = {}
 
 
@@ -27,17 +28,31 @@ def file_digest(path: Path) -> str:
     Raises:
         OSError: it cannot be read.
     """
-    status = path.stat()
-    stamp = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+    stamp = settled_stamp(path)
     known = _known.get(path)
     if known is not None and known[0] == stamp:
         return known[1]
     with path.open("rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
     _known.pop(path, None)
-    if abs(time.time() - max(status.st_mtime, status.st_ctime)) > SETTLED:
+    if stamp is not None:
         _known[path] = stamp, digest
     return digest
+
+
+def settled_stamp(path: Path) -> Stamp | None:
+    """What the file system says of a file or folder that changes with it; None where it may change without a trace.
+
+    Args:
+        path: of it.
+
+    Raises:
+        OSError: it cannot be looked at.
+    """
+    status = path.stat()
+    if abs(time.time() - max(status.st_mtime, status.st_ctime)) <= SETTLED:
+        return None
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
 
 
 def seal(path: Path) -> None:

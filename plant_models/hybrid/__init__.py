@@ -65,7 +65,7 @@ __all__ = [
     "width",
 ]
 
-__getattr__ = lazy_imports(
+__getattr__, __dir__ = lazy_imports(
     __name__,
     {
         "NumpyKernel": "plant_models.hybrid.kernel",

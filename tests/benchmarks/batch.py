@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import resource
 import sys
-import time
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
+from cpu_time import seconds
 
 from cosim import Scenario
 from cosim.studies.seed_runs import seed_study
@@ -54,13 +52,6 @@ def seeds(count: int) -> None:
     spent = seconds(lambda: seed_study(scenario, range(count)))
     more = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     print(f"{count} seeds of {SCENARIO}: {spent / count:.3f} s a seed, {more / 1024:.0f} MB more than one run")
-
-
-def seconds(call: Callable[[], Any]) -> float:
-    """CPU seconds of a call."""
-    begin = time.process_time()
-    call()
-    return time.process_time() - begin
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from cpu_time import seconds
 
 from cosim import Scenario
 from cosim.choice.benchmark import benchmark_observers
@@ -35,13 +36,6 @@ CURRENTS = (("filter.current_d", "motor.current_d"), ("filter.current_q", "motor
 def quietly(scenario: Scenario) -> Any:
     """The outcome of a run."""
     return scenario.run(warn=lambda _text: None)
-
-
-def seconds(deed: Callable[[], object]) -> float:
-    """CPU time of a call [s]."""
-    begun = time.process_time()
-    deed()
-    return time.process_time() - begun
 
 
 def line() -> Scenario:

@@ -9,12 +9,12 @@ matrices only. Nothing is asserted. Times are CPU seconds of this process.
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
 import filterpy.kalman
 import numpy as np
+from cpu_time import seconds
 
 from cosim.fmu_filter.component import FmuFilterModel
 from cosim.fmu_filter.settings import FilterTable
@@ -193,13 +193,6 @@ def train() -> Callable[[np.ndarray], None]:
         theirs.update(reading[:1])
 
     return step
-
-
-def seconds(call: Callable[[], Any]) -> float:
-    """CPU seconds of a call."""
-    start = time.process_time()
-    call()
-    return time.process_time() - start
 
 
 if __name__ == "__main__":

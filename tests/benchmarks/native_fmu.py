@@ -10,12 +10,12 @@ asserted. A further section is a function in `SECTIONS` that prints.
 from __future__ import annotations
 
 import statistics
-import sys
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
+from cpu_time import run_sections
 from native_foreign import foreign
 from native_step import step
 
@@ -71,11 +71,7 @@ SECTIONS: dict[str, Callable[[], None]] = {"build": build, "step": step, "foreig
 
 def main() -> None:
     """Run the sections named on the command line, or all."""
-    unknown = [name for name in sys.argv[1:] if name not in SECTIONS]
-    if unknown:
-        raise SystemExit(f"There is no section {', '.join(unknown)}; there are: {', '.join(SECTIONS)}.")
-    for name in sys.argv[1:] or SECTIONS:
-        SECTIONS[name]()
+    run_sections(SECTIONS)
 
 
 if __name__ == "__main__":

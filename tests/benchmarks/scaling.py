@@ -18,6 +18,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from cpu_time import run_sections
 from lag_fmus import Chain, H, make_chain
 from masters import c_loop
 
@@ -183,11 +184,7 @@ def main() -> None:
     if sys.argv[1:2] == ["alone"]:
         alone(*sys.argv[2:5])
         return
-    unknown = [name for name in sys.argv[1:] if name not in SECTIONS]
-    if unknown:
-        raise SystemExit(f"There is no section {', '.join(unknown)}; there are: {', '.join(SECTIONS)}.")
-    for name in sys.argv[1:] or SECTIONS:
-        SECTIONS[name]()
+    run_sections(SECTIONS)
 
 
 if __name__ == "__main__":

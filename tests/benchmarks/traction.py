@@ -5,11 +5,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
+from cpu_time import seconds
 
 from cosim import Scenario
 from cosim.studies.replay import Replay
@@ -39,13 +36,6 @@ def main() -> None:
     samples = HABITATS * len(recording.result.time)
     print(f"{HABITATS} candidates over {len(recording.result.time)} samples: {1e6 * spent / samples:.3f} us a sample")
     print(f"  {HABITATS} habitats, {ITERATIONS} iterations: {ITERATIONS * spent:.2f} s")
-
-
-def seconds(call: Callable[[], Any]) -> float:
-    """CPU seconds of a call."""
-    started = time.process_time()
-    call()
-    return time.process_time() - started
 
 
 if __name__ == "__main__":

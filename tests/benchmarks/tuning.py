@@ -6,10 +6,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-
 import numpy as np
+from cpu_time import seconds
 
 from cosim import Scenario
 from cosim.studies.replay import Replay
@@ -19,13 +17,6 @@ from fmu_observer.design.optimisers.optimiser_search import minimise
 
 CURRENTS = ["current_d", "current_q"]
 NAMES = [*(f"process_variance[{i}]" for i in range(1, 5)), "measurement_variance[1]", "measurement_variance[2]"]
-
-
-def seconds(deed: Callable[[], object]) -> float:
-    """CPU time of a call [s]."""
-    begun = time.process_time()
-    deed()
-    return time.process_time() - begun
 
 
 def main() -> None:

@@ -439,6 +439,14 @@ class Reference:
         self.runtime.communicate()
 
 
+def archive(system: str | HybridSystem | Path, version: int, protocol: EventProtocol | None = None) -> Path:
+    """The FMU of a system, stated by its name too, or the one that it is."""
+    if isinstance(system, Path):
+        return system
+    made = make_system(system) if isinstance(system, str) else system
+    return cached_fmu(made, version, protocol=protocol or EventProtocol())  # type: ignore[arg-type]
+
+
 @pytest.fixture
 def component(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Component]]:
     """Instances of FMUs, freed at the end: ``component(name, system or path, fmi_version)``; not yet initialised. With
@@ -446,9 +454,7 @@ def component(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Compon
     alive: list[Component] = []
 
     def make(system: str | HybridSystem | Path, version: int, logging: bool = False, counts: bool = False) -> Component:
-        stated = make_system(system) if isinstance(system, str) else system
-        protocol = EventProtocol("counts" if counts else None)
-        fmu = stated if isinstance(stated, Path) else cached_fmu(stated, version, protocol=protocol)  # type: ignore[arg-type]
+        fmu = archive(system, version, EventProtocol("counts" if counts else None))
         made = Component(fmu, unpacked(fmu))
         made.instantiate(logging)
         alive.append(made)
@@ -473,8 +479,7 @@ def exchange(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Exchang
     alive: list[Exchange] = []
 
     def make(system: str | HybridSystem | Path, version: int, logging: bool = False) -> Exchange:
-        known = make_system(system) if isinstance(system, str) else system
-        fmu = known if isinstance(known, Path) else cached_fmu(known, version)  # type: ignore[arg-type]
+        fmu = archive(system, version)
         made = Exchange(fmu, unpacked(fmu), logging)
         alive.append(made)
         return made

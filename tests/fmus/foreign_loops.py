@@ -16,6 +16,7 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from balise_loop import PLANT_PRESET, TRAIN
 from c_hosts import Unpacked, Wiring, compile_host, run
 from fmpy import read_model_description, simulate_fmu
 
@@ -26,8 +27,6 @@ from plant_models.hybrid import HybridSystem, Runtime, scalar_names
 
 STEP, STEPS = 0.01, 4000
 SPACING = 5.0
-PLANT_PRESET = "chapter_3_four_axles"
-TRAIN = {"n_axles": 4.0, "davis_b": 32.0, "davis_c": 1.7}
 
 MODELS: dict[str, tuple[str, str | None, dict[str, float]]] = {
     "train": ("locomotive", PLANT_PRESET, {}),

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from balise_loop import TRAIN, balise_loop
 from c_hosts import Unpacked, Wiring, compile_host, run
 
 import cosim
@@ -19,7 +20,6 @@ from fmus import build_fmu, cached_fmu, recipe
 pytestmark = pytest.mark.compiler
 
 STOP, STEP = 60.0, 0.01
-TRAIN = {"n_axles": 4.0, "davis_b": 32.0, "davis_c": 1.7}
 FACES = {"fmi2": (2, "counts"), "fmi3-clocks": (3, "clocks"), "fmi3-counts": (3, "counts")}
 OBSERVED = ("observer.position", "observer.speed", "observer.adhesion_force", "observer.innovation")
 
@@ -117,18 +117,7 @@ def master() -> Callable[[str], cosim.Outcome]:
 
     def ran(method: str) -> cosim.Outcome:
         if method not in outcomes:
-            s = cosim.Scenario(stop=STOP, step=STEP, certificates="ignore")
-            s.add("train", model="locomotive", preset="chapter_3_four_axles")
-            s.add("odometer", model="odometer").add("driver", model="driver")
-            s.add("observer", observer="takagi_sugeno_cdo", parameters=TRAIN)
-            s.connect(
-                "driver.effort -> train.effort, observer.effort",
-                "train.wheel_speed -> odometer.wheel_speed",
-                "odometer.reading -> driver.odometer, observer.odometer",
-            )
-            where = {"position": "train.position", "speed": "train.speed", "track_end": 3000.0}
-            s.balises(**where, layout="spacing", spacing=5.0, method=method)
-            outcomes[method] = s.run()
+            outcomes[method] = balise_loop(STOP, STEP, 5.0, method).run()
             assert outcomes[method].failure is None
         return outcomes[method]
 

@@ -9,13 +9,12 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
+from balise_loop import balise_loop
 from foreign_loops import (
     MASTERS,
-    PLANT_PRESET,
     SPACING,
     STEP,
     STEPS,
-    TRAIN,
     Crossings,
     accuracy,
     exact_observer,
@@ -23,8 +22,6 @@ from foreign_loops import (
     in_time,
     run_master,
 )
-
-import cosim
 
 pytestmark = [pytest.mark.compiler, pytest.mark.foreign]
 
@@ -104,19 +101,7 @@ def test_two_masters_of_equal_order_agree(ran: Callable[[str, int], np.ndarray])
 
 def test_in_sequence_it_is_the_run_of_the_package_own_master(ran: Callable[[str, int], np.ndarray]) -> None:
     table = ran("container-sequential", 1)
-    s = cosim.Scenario(stop=STEPS * STEP, step=STEP, certificates="ignore")
-    s.add("train", model="locomotive", preset=PLANT_PRESET).add("odometer", model="odometer").add(
-        "driver", model="driver"
-    )
-    s.add("observer", observer="takagi_sugeno_cdo", parameters=TRAIN)
-    s.connect(
-        "driver.effort -> train.effort, observer.effort",
-        "train.wheel_speed -> odometer.wheel_speed",
-        "odometer.reading -> driver.odometer, observer.odometer",
-    )
-    where = {"position": "train.position", "speed": "train.speed", "track_end": 3000.0}
-    s.balises(**where, layout="spacing", spacing=SPACING, method="rollback")
-    outcome = s.run()
+    outcome = balise_loop(STEPS * STEP, STEP, SPACING, "rollback").run()
     np.testing.assert_allclose(
         Crossings.of(table).stamps, [e.stamp for e in outcome.result.events], rtol=0.0, atol=STAMP
     )

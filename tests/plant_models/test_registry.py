@@ -200,7 +200,7 @@ def test_an_expectation_may_be_registered_at_any_time(monkeypatch: pytest.Monkey
     scenario = Scenario(stop=1.0, step=0.5).add("driver", model="driver")
     stated = {"check": "test_settles", "signal": "driver.effort", "within": 1e9}
     with pytest.raises(ValueError, match="expect, number 1: unknown check 'test_settles'"):
-        scenario.set("expect", [stated]).table()
+        scenario.set("expect", [stated])
 
     class SettlesExpectation(WindowExpectation):
         check: Literal["test_settles"] = "test_settles"
@@ -211,7 +211,7 @@ def test_an_expectation_may_be_registered_at_any_time(monkeypatch: pytest.Monkey
             return []
 
     EXPECTATIONS["test_settles"] = SettlesExpectation
-    (found,) = scenario.table().expect
+    (found,) = scenario.set("expect", [stated]).table().expect
     assert isinstance(found, SettlesExpectation)
     with pytest.raises(ValueError, match="expect, number 1, 'test_settles', within: "):
         scenario.set("expect", [stated | {"within": "x"}]).table()

@@ -1,17 +1,19 @@
-"""Does what a page tells the reader to type, where it is started: Python blocks, scenario files, commands.
+"""Does what a page tells the reader to type, where it is started: Python blocks, scenario files, commands; or runs the
+cells of a notebook and shows what each leaves, as a notebook would. No kernel is needed for that, and none is started.
 
 python page_reader.py PAGE
 """
 
 from __future__ import annotations
 
+import ast
 import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from pages import Block, blocks
+from pages import NOTEBOOKS, Block, blocks, code_cells
 
 import cosim.cli
 import fmus.cli
@@ -71,7 +73,29 @@ def run_python(page: Path, block: Block, names: dict[str, Any]) -> None:
     exec(compile(code, str(page), "exec", dont_inherit=True), names)  # a page has no __future__ imports of ours
 
 
+def run_notebook(page: Path) -> None:
+    names: dict[str, Any] = {"__name__": "notebook"}
+    for number, code in enumerate(code_cells(page), start=1):
+        place = f"{page.name}, cell {number}"
+        tree = ast.parse(code, place)
+        last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+        exec(compile(tree, place, "exec", dont_inherit=True), names)
+        if isinstance(last, ast.Expr):
+            show(eval(compile(ast.Expression(last.value), place, "eval", dont_inherit=True), names))
+
+
+def show(value: Any) -> None:
+    """What a notebook asks of the value of a cell."""
+    rich = [getattr(value, method) for method in ("_repr_html_", "_repr_png_") if hasattr(value, method)]
+    assert not rich or any(method() for method in rich), f"a notebook shows nothing of a {type(value).__name__}"
+    if value is not None:
+        print(repr(value))
+
+
 def read(page: Path) -> None:
+    if page in NOTEBOOKS:
+        run_notebook(page)
+        return
     text = page.read_text(encoding="utf-8")
     for name, build in OF_THE_READER.items():
         if name in text and f"fmus build locomotive -o {name}" not in text:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import re
 import sys
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ PACKAGES = ("plant_models", "fmu_observer", "fmus", "cosim")
 BOOKS = ("guide", "theses", "reference")
 PAGES = [README, *sorted(p for folder in (".", *BOOKS) for p in (ROOT / "docs" / folder).glob("*.md"))]
 STEP_BY_STEP = "<!-- each line is typed into a shell, in order -->"
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 TUTORIALS = [page for page in PAGES if STEP_BY_STEP in page.read_text(encoding="utf-8")]
 
 MARK, FENCED = r"(?:^<!-- command: (?P<command>\w+) -->\n)?", r"^```(?P<language>\w+)\n(?P<code>.*?)^```$"
@@ -38,6 +40,12 @@ def blocks(page: Path) -> list[Block]:
         Block(m["language"], m["code"], text.count("\n", 0, m.start("code")) + 1, m["command"])
         for m in FENCE.finditer(text)
     ]
+
+
+def code_cells(notebook: Path) -> list[str]:
+    """Code of the cells of a notebook, in order."""
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
 
 
 def generator() -> ModuleType:

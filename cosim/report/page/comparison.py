@@ -11,8 +11,9 @@ from contextlib import AbstractContextManager
 from math import inf, isfinite
 from pathlib import Path
 
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.comparison_text import VERDICTS, signals_table
-from cosim.comparison.verdict import Comparison, ComparisonFinding, EventComparison, SignalComparison
+from cosim.comparison.verdict import ComparisonFinding, EventComparison, SignalComparison
 from cosim.report.live.live_page import Card, Folded, LivePage, Mood, Rows, Section, Verdict
 from cosim.report.live.render import live_page
 from cosim.report.page.comparison_curves import comparison_marks, comparison_panels, comparison_recordings

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cosim.comparison.verdict import Comparison, Curves, SignalComparison
+from cosim.comparison.comparison import Comparison
+from cosim.comparison.verdict import Curves, SignalComparison
 from cosim.report.live.live_page import Curve, Mark, Panel, Recording
 
 TUBE, ERROR = "tolerance tube", "result minus reference"

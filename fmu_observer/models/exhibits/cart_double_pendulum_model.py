@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.observer_model import ObserverModel
-from plant_models.exhibits.cart_double_pendulum import SECTION_IV_2_2_3, accelerations
-from plant_models.hybrid import Array, input_signal, state, vector
+from fmu_observer.models.observer_model import ObserverModel, zero_states
+from plant_models.exhibits.cart_double_pendulum import SECTION_IV_2_2_3, CartDoublePendulum, accelerations
+from plant_models.hybrid import Array, input_signal, vector
 
 _CHAINS = np.kron(np.eye(3), np.array([[0.0, 1.0], [0.0, 0.0]]))  # position and speed, each angle and its rate
 
@@ -17,15 +17,8 @@ def cart_double_pendulum() -> ObserverModel:
         name="cart_double_pendulum",
         description="Cart with an inverted double pendulum, position and both angles measured",
         source="Allaoui 2024, (4.12) to (4.18), section IV.2.2.3, signs repaired",
-        states=(
-            state("position", "m", 0.0, "Position of the cart"),
-            state("speed", "m/s", 0.0, "Speed of the cart"),
-            state("first_angle", "rad", 0.0, "Angle of the lower rod from upright"),
-            state("first_rate", "rad/s", 0.0, "Angular speed of the lower rod"),
-            state("second_angle", "rad", 0.0, "Angle of the upper rod from upright"),
-            state("second_rate", "rad/s", 0.0, "Angular speed of the upper rod"),
-        ),
-        inputs=(input_signal("force", "N", 0.0, "Force on the cart"),),
+        states=zero_states(CartDoublePendulum.plain_outputs[:6]),
+        inputs=CartDoublePendulum.inputs,
         measurements=(
             input_signal("position", "m", 0.0, "Measured position of the cart"),
             input_signal("first_angle", "rad", 0.0, "Measured angle of the lower rod"),

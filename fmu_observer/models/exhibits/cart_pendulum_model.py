@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fmu_observer.models.observer_model import ObserverModel
-from plant_models.exhibits.cart_pendulum import TABLE_4_1, accelerations
-from plant_models.hybrid import Array, input_signal, state, vector
+from fmu_observer.models.observer_model import ObserverModel, zero_states
+from plant_models.exhibits.cart_pendulum import TABLE_4_1, CartPendulum, accelerations
+from plant_models.hybrid import Array, input_signal, vector
 
 _CHAINS = np.kron(np.eye(2), np.array([[0.0, 1.0], [0.0, 0.0]]))  # position and speed, angle and rate
 
@@ -17,13 +17,8 @@ def cart_pendulum() -> ObserverModel:
         name="cart_pendulum",
         description="Cart with an inverted pendulum, position and angle measured",
         source="Allaoui 2024, (4.6) to (4.10), Table 4.1",
-        states=(
-            state("position", "m", 0.0, "Position of the cart"),
-            state("speed", "m/s", 0.0, "Speed of the cart"),
-            state("angle", "rad", 0.0, "Angle of the pendulum from upright"),
-            state("rate", "rad/s", 0.0, "Angular speed of the pendulum"),
-        ),
-        inputs=(input_signal("force", "N", 0.0, "Force on the cart"),),
+        states=zero_states(CartPendulum.plain_outputs[:4]),
+        inputs=CartPendulum.inputs,
         measurements=(
             input_signal("position", "m", 0.0, "Measured position of the cart"),
             input_signal("angle", "rad", 0.0, "Measured angle of the pendulum"),

@@ -13,10 +13,11 @@ from plant_models.exhibits.flexible_joint_arm import (
     STIFFNESS_LINK,
     STIFFNESS_MOTOR,
     WEIGHT,
+    FlexibleJointArm,
     Gravity,
     checked_gravity,
 )
-from plant_models.hybrid import Array, input_signal, state, vector
+from plant_models.hybrid import Array, input_signal, vector
 
 _NAMES = ("motor_angle", "link_angle", "motor_speed", "link_speed")
 
@@ -35,12 +36,7 @@ def flexible_joint_arm(gravity: Gravity = "link_angle") -> ObserverModel:
         name="flexible_joint_arm" + ("" if gravity == "link_angle" else "_as_printed"),
         description="Robot arm with a flexible joint, two angles measured by two nodes",
         source="Hann 2014, (2.60) to (2.62)" + (", the weight acting on the link's angle" if at == 1 else ""),
-        states=(
-            state("motor_angle", "rad", 0.0, "Angle of the motor"),
-            state("link_angle", "rad", 0.0, "Angle of the link"),
-            state("motor_speed", "rad/s", 0.0, "Angular speed of the motor"),
-            state("link_speed", "rad/s", 0.0, "Angular speed of the link"),
-        ),
+        states=FlexibleJointArm.states,
         inputs=(input_signal("drive", "1", 0.0, "Drive u of the motor"),),
         measurements=(
             input_signal("motor_angle", "rad", 0.0, "Angle of the motor, node 1"),

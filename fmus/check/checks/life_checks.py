@@ -165,8 +165,8 @@ class InitialiseCheck(Check, failing=DISTRUST, advice="give start values, if it 
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        with context.quiet_runner() as runner:
-            runner.begin(excited=False)
+        with context.begun_runner():
+            pass
         return passed("instantiates, initialises, terminates and is freed")
 
 
@@ -179,8 +179,7 @@ class ValuesAtStartCheck(
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        with context.quiet_runner() as runner:
-            runner.begin(excited=False)
+        with context.begun_runner() as runner:
             slave = runner.component
             outputs, locals_ = slave.names("output"), slave.names("local")
             bad_outputs = not_finite(outputs, slave.read(outputs), slave.variables)
@@ -199,8 +198,7 @@ class GettersCheck(Check, failing=LIMIT, advice="leave these variables out of co
 
     @staticmethod
     def run(context: Context) -> CheckOutcome:
-        with context.quiet_runner() as runner:
-            runner.begin(excited=False)
+        with context.begun_runner() as runner:
             slave = runner.component
             own = [v for v in slave.description.modelVariables if v.alias is None]
             readable = [v for v in own if v.type != "Clock" and not v.clocks]

@@ -13,6 +13,7 @@ from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, outpu
 from plant_models.hybrid.option import require_chosen
 from plant_models.railway.control.effort_limits import (
     DRIVE_AND_BRAKES,
+    FOLLOWED,
     PRESETS,
     air_brake_demand,
     electric_brake_limit,
@@ -85,8 +86,7 @@ class AdrcController(HybridSystem):
     )
     inputs = (
         input_signal("odometer", "m/s", 0.0, "Odometer speed", display_unit="km/h"),
-        input_signal("speed_reference", "m/s", 0.0, "Speed to be driven", display_unit="km/h"),
-        input_signal("acceleration_reference", "m/s2", 0.0, "Acceleration of the reference"),
+        *FOLLOWED,
     )
     outputs = (
         output_signal("effort", "N", "Effort demand of the locomotive's drive: traction > 0, electric brake < 0"),

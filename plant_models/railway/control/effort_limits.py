@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_models.hybrid import Array, parameter
+from plant_models.hybrid import Array, input_signal, parameter
 
 DRIVE_AND_BRAKES = (
     parameter("effort_limit", "N", 350e3, "Largest traction effort", min=1.0),
@@ -26,6 +26,11 @@ DRIVE_AND_BRAKES = (
 """Limits of the BB27000 (Bouchama 2024, section 4.1); the brakes are ours, the air brake that of `train` with 4
 wagons.
 """
+FOLLOWED = (
+    input_signal("speed_reference", "m/s", 0.0, "Speed to be driven", display_unit="km/h"),
+    input_signal("acceleration_reference", "m/s2", 0.0, "Acceleration of the reference"),
+)
+"""The reference that a controller of the train follows."""
 PRESETS: Mapping[str, Mapping[str, Any]] = {
     "train": {},
     "single_mass": {

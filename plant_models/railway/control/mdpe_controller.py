@@ -14,6 +14,7 @@ from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
 from plant_models.hybrid.signal import discrete_output, input_signal, memory, output_signal, parameter
 from plant_models.railway.control.effort_limits import (
     DRIVE_AND_BRAKES,
+    FOLLOWED,
     PRESETS,
     air_brake_demand,
     electric_brake_limit,
@@ -124,8 +125,7 @@ class MdpeController(HybridSystem):
         input_signal(
             "slope", "1", 0.0, "Gradient of the track from the track data, uphill > 0; sine of the angle", optional=True
         ),
-        input_signal("speed_reference", "m/s", 0.0, "Speed to be driven", display_unit="km/h"),
-        input_signal("acceleration_reference", "m/s2", 0.0, "Acceleration of the reference"),
+        *FOLLOWED,
     )
     outputs = (
         discrete_output("effort", "N", "Effort of the locomotive's drive: traction > 0, electric brake < 0"),

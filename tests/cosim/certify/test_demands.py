@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from cosim.certify import Certified, Demands, certified
-from fmu_observer.certificates.finding import Finding
+from fmu_observer.certificates.finding import Finding, Kind
 from fmu_observer.observers.generic.delayed import DelayedStateObserver
 from fmu_observer.observers.train import DifferentiatorCdo
 
@@ -45,3 +46,22 @@ def test_a_delay_is_certified_where_predictors_and_memory_bear_it(delay: float) 
 def test_what_is_not_demanded_is_not_held_against() -> None:
     assert of_train(Demands()).demanded == ()
     assert all(isinstance(f, Finding) and f.holds is None for f in of_train(Demands()).findings)
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What is known of an observer is one limit."""
+
+    limit: Finding
+    parameter_signals = triggered_events = ()
+
+    def findings(self, *_: object) -> list[Finding]:
+        return [self.limit]
+
+
+@given(period=st.floats(0.1, 2.0), kind=st.sampled_from(["exact", "not found up to"]))
+@example(period=1.0, kind="exact")
+@example(period=1.0, kind="not found up to")
+def test_up_to_where_a_search_found_no_limit_includes_its_end_and_a_limit_does_not(period: float, kind: Kind) -> None:
+    found = certified("o", Searched(Finding("constant gap", 1.0, "s", kind, "a test")), Demands(period=period))
+    assert (found.unmet == []) == (period < 1.0 or (period == 1.0 and kind == "not found up to"))

@@ -325,7 +325,7 @@ class Lost(Constant):
 
 def test_one_that_fails_takes_nobody_along() -> None:
     """Two that end early in different ways and one that cannot be set up, among two that are well: each as alone."""
-    refused = two().set("uio.parameters", {"sample_period": -1.0})
+    refused = two().with_settings({"uio.parameters": {"sample_period": -1.0}})
     alone = benchmark_observers(two(), ["observer"]).scores[0]
     observers = [Constant(believed=9.0), Breaks(), "observer", Lost(believed=9.0), "uio"]
     found = {score.name: score for score in benchmark_observers(refused, observers).scores}

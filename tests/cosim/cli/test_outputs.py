@@ -141,7 +141,7 @@ def test_json_is_one_value_and_holds_what_the_text_holds(output: Output, capsys:
 
 
 @pytest.mark.compiler
-@pytest.mark.parametrize("width", [60, 80, 120])
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
 @pytest.mark.parametrize("output", CASES, indirect=True, ids=" ".join)
 def test_no_line_is_wider_than_the_terminal(
     output: Output, width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -46,9 +46,9 @@ def files(tmp_path: Path) -> dict[str, Path]:
     """A scenario that fails and one that does not, with what was made of the latter before it began to fail."""
 
     def made(name: str, from_when: float, model: str = "Worn") -> Path:
-        s = Scenario(stop=0.6, step=0.1, title="Boiler").add("boiler", model=f"{FILE}:{model}", **{"as": "block3"})
-        if model == "Worn":
-            s.set("boiler.from_when", from_when)
+        parameters = {"from_when": from_when} if model == "Worn" else {}
+        boiler = {"model": f"{FILE}:{model}", "as": "block3", "parameters": parameters}
+        s = Scenario(stop=0.6, step=0.1, title="Boiler", components={"boiler": boiler})
         return s.save(tmp_path / f"{name}.toml")
 
     files = {name: tmp_path / name.lower() for name in ("OUT", "RESULTS")}

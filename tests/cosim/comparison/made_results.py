@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from cosim.comparison.compare import compare_results
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.tolerance import Tolerance, Tolerances
-from cosim.comparison.verdict import Comparison, SignalComparison
+from cosim.comparison.verdict import SignalComparison
 from cosim.results.result import BaliseRecord, Result, SignalInfo
 
 STRICT = Tolerance(absolute=1e-3, relative=0.0, time=1e-6)

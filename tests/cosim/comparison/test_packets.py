@@ -9,8 +9,8 @@ import pytest
 from made_results import compared, made
 
 from cosim.comparison.compare import _keeps_packets
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.comparison_text import comparison_text
-from cosim.comparison.verdict import Comparison
 from cosim.provenance.rerun import _equal_result
 from cosim.report.live.render import live_page
 from cosim.report.page.comparison import comparison_page

@@ -74,13 +74,17 @@ def test_every_numeric_type(tmp_path: Path, version: Literal[2, 3]) -> None:
     assert_equal(python, compiled)
 
 
+def counted(folder: Path, factor: float) -> Scenario:
+    """A count of the crossings of a ramp, multiplied, into a whole number of 32 bits."""
+    scenario = Scenario(folder=folder, stop=3.0, step=0.01)
+    scenario.add("ramp", fmu=str(triggered_fmu(folder, event_mode=False)))
+    scenario.add("typed", fmu=str(typed_fmu(folder, version=2)))
+    scenario._data["connections"] = [{"from": "ramp.count", "to": "typed.u_int32", "factor": factor}]
+    return scenario
+
+
 def test_a_value_that_does_not_fit_its_type(tmp_path: Path) -> None:
-    scenario = Scenario(folder=tmp_path, stop=3.0, step=0.01)
-    scenario.add("ramp", fmu=str(triggered_fmu(tmp_path, event_mode=False))).add(
-        "typed", fmu=str(typed_fmu(tmp_path, version=2))
-    )
-    scenario._data["connections"] = [{"from": "ramp.count", "to": "typed.u_int32", "factor": 1e9}]
-    python, compiled = both(scenario)
+    python, compiled = both(counted(tmp_path, 1e9))
     assert python.failure is not None
     assert "typed" in python.failure
     assert steps_compiled(compiled) > 1
@@ -89,12 +93,7 @@ def test_a_value_that_does_not_fit_its_type(tmp_path: Path) -> None:
 
 def test_whole_numbers_are_rounded_to_even(tmp_path: Path) -> None:
     """Half a count is 0.5, 1.5, 2.5, ...: rounded to 0, 2, 2, ..."""
-    scenario = Scenario(folder=tmp_path, stop=3.0, step=0.01)
-    scenario.add("ramp", fmu=str(triggered_fmu(tmp_path, event_mode=False))).add(
-        "typed", fmu=str(typed_fmu(tmp_path, version=2))
-    )
-    scenario._data["connections"] = [{"from": "ramp.count", "to": "typed.u_int32", "factor": 0.5}]
-    python, compiled = both(scenario)
+    python, compiled = both(counted(tmp_path, 0.5))
     assert python.failure is None
     assert python.result.table["ramp.count"][-1] > 5
     assert_equal(python, compiled)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,15 +38,20 @@ from plant_models.hybrid.signal import input_signal, memory, output_signal, para
 ALGORITHMS = ["gauss-seidel", "jacobi", "iterate"]
 
 
-class Lag(HybridSystem):
+class TwoInputs(HybridSystem):
+    """Two inputs in, two outputs out."""
+
+    source = "a test"
+    inputs = (input_signal("a", "1"), input_signal("b", "1"))
+    outputs = (output_signal("y", "1"), output_signal("z", "1"))
+
+
+class Lag(TwoInputs):
     """``dx/dt = rate * (a - x) + b``: an input that acts over the step, one that also passes through at once."""
 
     name = "lag"
     description = "A lag"
-    source = "a test"
     states = (state("x", "1"),)
-    inputs = (input_signal("a", "1"), input_signal("b", "1"))
-    outputs = (output_signal("y", "1"), output_signal("z", "1"))
     parameters = (parameter("rate", "1/s", 0.7),)
 
     def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
@@ -55,15 +61,13 @@ class Lag(HybridSystem):
         return {"y": x.x, "z": 0.3 * u.b + x.x}
 
 
-class Sampler(HybridSystem):
+class Sampler(TwoInputs):
     """Keeps a sample of its inputs."""
 
     name = "sampler"
     description = "A sampler"
-    source = "a test"
     states = (memory("kept", "1"),)
-    inputs = (input_signal("a", "1"), input_signal("b", "1"))
-    outputs = (output_signal("y", "1", variability="discrete"), output_signal("z", "1", variability="discrete"))
+    outputs = tuple(replace(s, variability="discrete") for s in TwoInputs.outputs)
     parameters = (parameter("period", "s", 0.2), parameter("offset", "s", 0.0))
     events = (PeriodicEvent("sample", "period", "offset"),)
 
@@ -292,9 +296,9 @@ def test_what_was_said_of_columns_outlives_files_and_is_shown(tmp_path: Path) ->
     """A saved scenario, `cosim show` with Jacobi, and a record of the run: the column is what it was."""
     (tmp_path / "log.csv").write_text("time,u,v\n0,1,1\n0.5,2,3\n1,2,4\n", encoding="utf-8")
     scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1, master={"algorithm": "jacobi"})
-    scenario.add("log", recording="log.csv", interpolation={"u": "hold"}).add("lag", model="lag_of_tests", **BLOCK)
     PLANTS["lag_of_tests"] = Lag
     try:
+        scenario.add("log", recording="log.csv", interpolation={"u": "hold"}).add("lag", model="lag_of_tests", **BLOCK)
         scenario.connect("log.u -> lag.a", "log.v -> lag.b")
         reported = [when(link) for link in scenario.structure().links]
         assert sorted(reported) == ["a line, its course within the step", "held, of the start of the step"]

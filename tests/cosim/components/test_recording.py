@@ -211,7 +211,7 @@ def test_time_that_goes_back_is_refused_with_its_row() -> None:
 
 
 def test_a_missing_file_is_named_with_its_place(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"components\.rec: recording .*nowhere\.csv cannot be read"):
+    with pytest.raises(ScenarioError, match=r"components\.rec: there is no .*nowhere\.csv"):
         listening(tmp_path, tmp_path / "nowhere.csv").run()
 
 

@@ -160,8 +160,8 @@ def test_a_wrong_row_of_telegrams_is_reported_with_its_file_once(tmp_path: Path)
 
 def test_recorded_telegrams_are_not_exported(tmp_path: Path) -> None:
     TELEGRAM_ROWS.write(tmp_path / "events.csv", [telegram()])
-    scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1).add("log", recording="log.csv")
     (tmp_path / "log.csv").write_text("time,position,speed\n0,0,1\n1,1,1\n", encoding="utf-8")
+    scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1).add("log", recording="log.csv")
     scenario.balises(position="log.position", speed="log.speed", layout="recorded", file="events.csv")
     assert [e.identity for e in quietly(scenario).result.events] == ["B1"]
     with pytest.raises(CosimError, match="recorded telegrams cannot be exported; lay the balises by 'positions'"):

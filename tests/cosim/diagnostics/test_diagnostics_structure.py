@@ -139,7 +139,7 @@ def test_input_clocks_say_when_they_tick(tmp_path: Path) -> None:
 
 
 def test_mistakes_are_named_as_a_run_names_them(tmp_path: Path) -> None:
-    with pytest.raises(FmuLoadError, match=r"script: plant: .*missing\.fmu"):
+    with pytest.raises(FmuLoadError, match=r"script: components\.plant: .*missing\.fmu"):
         Scenario(stop=1.0, step=0.1, folder=tmp_path).add("plant", fmu="missing.fmu").structure()
     with pytest.raises(CouplingError, match="did you mean 'effort'"):
         small().connect("driver.effrot -> odometer.wheel_speed").structure()

@@ -16,7 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim.comparison.compare import compare_results
-from cosim.comparison.verdict import Comparison, ComparisonFinding, Curves, EventComparison, SignalComparison
+from cosim.comparison.comparison import Comparison
+from cosim.comparison.verdict import ComparisonFinding, Curves, EventComparison, SignalComparison
 from cosim.drawing.style import new_figure, png
 from cosim.errors import OutputError
 from cosim.report.figures.comparison_figure import (

@@ -5,7 +5,6 @@ full.
 from __future__ import annotations
 
 import resource
-import tracemalloc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from traced_memory import recorded
 
 from cosim.errors import OutputError
 from cosim.results import recorder as recorder_module
@@ -141,14 +141,7 @@ def test_memory_stays_bounded_whatever_the_length(monkeypatch: pytest.MonkeyPatc
     """
     monkeypatch.setattr(recorder_module, "BLOCK", 0.5e6)
     recorder, signals = Recorder([SignalInfo(f"a.s{i}") for i in range(99)], 0, memory=1e6), np.zeros(99)
-    tracemalloc.start()
-    try:
-        for k in range(120_000):
-            recorder.add(float(k), signals)
-        table = recorder.table()
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    table, peak = recorded(recorder, signals, 120_000)
     assert table.nbytes > 90e6
     assert peak < 3e6  # the memory while it doubles, and a block
     np.testing.assert_array_equal(table["time"], np.arange(120_000.0))

@@ -10,7 +10,6 @@ import resource
 import signal
 import subprocess
 import sys
-import tracemalloc
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,6 +21,7 @@ from hypothesis import strategies as st
 from small_scenarios import small
 from test_fmus.build import linear_fmu
 from test_fmus.description import Version
+from traced_memory import recorded
 
 from cosim import Scenario
 from cosim.diagnostics.messages import MessageLog
@@ -157,14 +157,7 @@ def test_memory_stays_flat_and_the_end_is_trimmed(tmp_path: Path, monkeypatch: p
     signals, values = [SignalInfo(f"a.s{i}") for i in range(99)], np.ones(99)
     stream = Stream(tmp_path, signals, lambda _name: None, {}, list, [])
     recorder = Recorder(signals, 0, stream=stream)
-    tracemalloc.start()
-    try:
-        for k in range(37_500):
-            recorder.add(float(k), values)
-        table = recorder.table()
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    table, peak = recorded(recorder, values, 37_500)
     assert table.nbytes == 30e6
     assert peak < 1.5e6  # a block, its copy in SI
     stream.finish()

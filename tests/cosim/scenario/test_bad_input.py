@@ -388,9 +388,8 @@ def test_a_name_under_the_wrong_key_is_reported_with_the_right_one(written: str,
     ],
 )
 def test_a_model_that_a_filter_cannot_have_is_no_traceback(options: dict[str, object], message: str) -> None:
-    scenario = Scenario(stop=1.0, step=0.1).add("filter", observer="extended_kalman_filter", options=options)
     with pytest.raises(CosimError, match=message):
-        scenario.run()
+        Scenario(stop=1.0, step=0.1).add("filter", observer="extended_kalman_filter", options=options)
 
 
 def test_an_observer_without_true_values_gets_no_row_of_dashes(

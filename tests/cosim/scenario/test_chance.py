@@ -302,7 +302,7 @@ def test_a_run_seed_is_a_whole_number(value: Any) -> None:
 def test_a_seed_of_its_own_is_a_whole_number(key: str, value: Any) -> None:
     scenario = sensors()
     if key == "balises.seed":
-        scenario.balises(position="a.reading", speed="b.reading", layout="aperiodic")
+        scenario.balises(position="train.position", speed="a.reading", layout="aperiodic")
     if key == "network.seed":
         scenario.network(nodes={"n": ["a.reading"]}, period=0.1)
     with pytest.raises(CosimError, match=r"script: .*(a|balises|network)\.(parameters\.)?seed"):

@@ -96,9 +96,8 @@ def test_what_does_not_fit_is_said_before_the_run(
     tmp_path: Path, record: list[str], parameters: Any, match: str
 ) -> None:
     path = typed_fmu(tmp_path)
-    s = cosim.Scenario(stop=0.1, step=0.1).add("one", fmu=str(path), record=record, parameters=parameters)
     with pytest.raises(CosimError, match=match):
-        s.run()
+        cosim.Scenario(stop=0.1, step=0.1).add("one", fmu=str(path), record=record, parameters=parameters).run()
 
 
 @pytest.mark.parametrize("value", [float("nan"), {"a": 1}, [1.0, [float("inf")]]])

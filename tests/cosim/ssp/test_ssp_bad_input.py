@@ -261,7 +261,6 @@ def test_what_a_version_cannot_say(tmp_path: Path) -> None:
         scenario.export_ssp(tmp_path / "a.ssp", version="3.0")
     with pytest.raises(CosimError, match=r"ends in \.ssp"):
         scenario.export_ssp(tmp_path / "a.zip")
-    scenario.set("ramp.x0[7]", 1.0)
     with pytest.raises(CosimError, match=r"no variable 'x0\[7\]'; did you mean"):
-        scenario.export_ssp(tmp_path / "a.ssp")
+        scenario.with_settings({"ramp.x0[7]": 1.0}).export_ssp(tmp_path / "a.ssp")
     assert not (tmp_path / "a.ssp").exists()

@@ -177,7 +177,7 @@ def test_an_interrupted_search_keeps_what_it_found_and_goes_on(tmp_path: Path, f
     drive_with_poor_guess().save(tmp_path / "drive.toml")
     overlay.write_text('include = ["drive.toml", "overlay.toml"]\n')
     assert mean_square(Scenario.load(overlay).run()) == pytest.approx(whole.after[0], rel=1e-12)
-    assert "judging seeds" in (tmp_path / "tuning.html").read_text("utf-8")
+    assert "validation seeds" in (tmp_path / "tuning.html").read_text("utf-8")
 
 
 SOME = {

@@ -6,9 +6,8 @@ from typing import Any
 
 from fmu_observer.formulas.differentiation.differentiator import differentiator_flow, filtering_differentiator_flow
 from fmu_observer.models.observer_model import named_as, stacked_of
-from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
+from fmu_observer.observers.generic.differentiators.signal_differentiator import FILTERED, LARGEST, SignalDifferentiator
 from plant_models.hybrid import Array
-from plant_models.hybrid.option import require_whole
 
 
 class FilteringDifferentiator(SignalDifferentiator):
@@ -28,18 +27,9 @@ class FilteringDifferentiator(SignalDifferentiator):
     source = "Bouchama 2024, (1.16), Theorem 4, general exponent"
     internal_step = 1e-3
     method = "euler"  # Levant's discretisation; stages of a higher order see a signal that stands still while they move
-    option_choices = {
-        "order": (0, 1, 2),
-        "filtering_order": tuple(range(1, LARGEST)),
-    }
+    option_choices, least_filtering = FILTERED, 1
 
     def __init__(self, order: int = 1, filtering_order: int = 3, unit: str = "1") -> None:
-        require_whole(self.name, 0, filtering_order=filtering_order)
-        if filtering_order < 1:
-            raise ValueError(
-                f"{self.name}: filtering order {filtering_order}, expected at least 1; use levant_differentiator "
-                f"without."
-            )
         super().__init__(order, filtering_order, unit)
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:

@@ -11,11 +11,10 @@ import numpy as np
 from fmu_observer.formulas.differentiation.differentiator import power
 from fmu_observer.formulas.differentiation.differentiator_gains import LEVANT_GAINS
 from fmu_observer.models.observer_model import named_as, stacked_of
-from fmu_observer.observers.generic.differentiators.signal_differentiator import LARGEST, SignalDifferentiator
+from fmu_observer.observers.generic.differentiators.signal_differentiator import FILTERED, SignalDifferentiator
 from fmu_observer.observers.generic.discrete.arrivals import at_sample, initialised_memory
 from plant_models.hybrid import Array, PeriodicEvent, memory, parameter
 from plant_models.hybrid.missing import or_else
-from plant_models.hybrid.option import require_whole
 
 _ITERATIONS = 7  # Newton from at most twice the root: the last two change nothing any more
 _SMALLEST = 1e-200  # stands in for an excess that is not positive, where the root is not used
@@ -41,15 +40,9 @@ class ImplicitDifferentiator(SignalDifferentiator):
     description = "Implicit discrete filtering differentiator of a sampled signal"
     source = "Bouchama 2024, (1.36), Theorem 5, third case repaired"
     discrete = True
-    option_choices = {
-        "order": (0, 1, 2),
-        "filtering_order": tuple(range(1, LARGEST)),
-    }
+    option_choices, least_filtering = FILTERED, 1
 
     def __init__(self, order: int = 1, filtering_order: int = 3, unit: str = "1") -> None:
-        require_whole(self.name, 0, filtering_order=filtering_order)
-        if filtering_order < 1:
-            raise ValueError(f"{self.name}: filtering order {filtering_order}, expected at least 1.")
         text = "The signal is read"
         self.events = (
             PeriodicEvent("sampling", "sample_period", description=text, samples=("signal",), leaves_out=True),

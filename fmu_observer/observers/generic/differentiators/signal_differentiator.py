@@ -15,12 +15,15 @@ from plant_models.hybrid import Array, Signal, discrete_output, input_signal, me
 from plant_models.hybrid.option import require_whole
 
 LARGEST = len(LEVANT_GAINS) - 1
+FILTERED = {"order": (0, 1, 2), "filtering_order": tuple(range(1, LARGEST))}
+"""Choices of a differentiator that filters."""
 
 
 class SignalDifferentiator(EvaluatedObserver):
     """Base of the differentiators of one scalar signal f with ``|f^(n+1)| <= L``.
 
-    The contract: a subclass sets `discrete` where the estimates are memory, gives the filter states and further signals
+    The contract: a subclass sets `discrete` where the estimates are memory and `least_filtering` where it needs filter
+    states, gives the filter states and further signals
     to ``super().__init__``, and writes `flow` or `jump`, and `accuracy`. The filter states are `filters`, the estimates
     of f and its n derivatives `estimates`.
 
@@ -39,6 +42,7 @@ class SignalDifferentiator(EvaluatedObserver):
     """
 
     discrete: ClassVar[bool] = False
+    least_filtering: ClassVar[int] = 0
 
     def __init__(
         self,
@@ -50,6 +54,9 @@ class SignalDifferentiator(EvaluatedObserver):
         extra_memory: tuple[Signal, ...] = (),
     ) -> None:
         require_whole(self.name, 0, order=order, filtering_order=filtering_order)
+        if filtering_order < self.least_filtering:
+            least = f"at least {self.least_filtering}; levant_differentiator has none"
+            raise ValueError(f"{self.name}: filtering order {filtering_order}, expected {least}.")
         if order + filtering_order > LARGEST:
             expected = f"whole numbers from 0 on with a sum of at most {LARGEST}, for which gains are tabulated"
             raise ValueError(f"{self.name}: order {order} with filtering order {filtering_order}: expected {expected}.")

@@ -1,0 +1,40 @@
+"""Recorded signals over time, those of one unit in one panel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cosim.drawing.style import TIME, new_figure, run_line, styled
+from cosim.report.figures.drawing import curve, legend_above
+from cosim.results.result_data import ResultData, SignalInfo
+
+_WIDTH, _HEIGHT = 8.4, 2.55  # [inch], of a panel
+
+
+@styled
+def signal_figure(result: ResultData, signals: Sequence[SignalInfo]) -> Figure:
+    """Signals over one time axis, a panel for each unit.
+
+    Args:
+        result: the run. signals: what is drawn.
+
+    Returns:
+        The figure; save it with ``figure.savefig(path)``.
+    """
+    units = list(dict.fromkeys(signal.unit for signal in signals))
+    figure = new_figure((_WIDTH, _HEIGHT * max(len(units), 1)))
+    rows = figure.subplots(max(len(units), 1), 1, sharex=True, squeeze=False)[:, 0]
+    for ax, unit in zip(rows, units, strict=False):
+        shown = [signal for signal in signals if signal.unit == unit]
+        for place, signal in enumerate(shown):
+            values = np.asarray(result[signal.name], dtype=float)
+            held = "steps-post" if signal.variability == "discrete" else "default"
+            curve(ax, result.time, values, None, label=signal.name, drawstyle=held, **run_line(place + 1))
+        ax.set_ylabel(f"[{unit}]" if len(shown) > 1 else f"{shown[0].name} [{unit}]")
+        if len(shown) > 1:
+            legend_above(ax)
+    rows[-1].set_xlabel(TIME)
+    return figure
