@@ -68,7 +68,12 @@ USUAL_STEPS = Steps()
 
 @dataclass(frozen=True)
 class MovingSystem:
-    """How a hybrid system moves, with all that a filter does not know at its start values."""
+    """How a hybrid system moves, with all that a filter does not know at its start values.
+
+    Args:
+        system: that moves. substeps: in a period. preset: of its start values. period: of the filter [s]; None for its
+            own.
+    """
 
     system: HybridSystem
     substeps: int
@@ -107,6 +112,9 @@ class MovingSystem:
     def check_outputs(self, rows: Sequence[int]) -> None:
         """No output is what periodic events made of a flowing state.
 
+        Args:
+            rows: of the outputs that are measured.
+
         Raises:
             ValueError: one is; the message names it.
         """
@@ -129,6 +137,7 @@ class MovingSystem:
 
     @property
     def states(self) -> tuple[Signal, ...]:
+        """What flows, or else what jumps, at the values of the preset."""
         kept = "continuous" if self.event is None else "discrete"
         starts = dict(zip(scalar_names(self.system.states), self.system.start_state(self.preset), strict=True))
         return tuple(
@@ -158,20 +167,30 @@ class MovingSystem:
 
     @property
     def sample_period(self) -> float:
+        """Period of the filter, or of the event by which the system moves [s]."""
         if self.event is None:
             return float(self.substeps * self.system.internal_step if self.period is None else self.period)
         names = scalar_names(self.system.parameter_signals)
         return float(self.system.start_parameters(self.preset)[names.index(self.system.periodic_events[0].period)])
 
     def longest_period(self, steps: Steps) -> float:
-        """The longest period in which no step is longer than the system's own [s]; none where the steps were given."""
+        """The longest period in which no step is longer than the system's own [s]; none where the steps were given.
+
+        Args:
+            steps: as they were stated.
+        """
         own = self.event is not None or steps.substeps is not None
         return inf if own else float(self.substeps * self.system.internal_step) * (1.0 + _ROUNDING)
 
     def deviates(
         self, names: Sequence[str], noises: Sequence[str], readings: Sequence[str], rows: Sequence[int]
     ) -> bool | None:
-        """Whether one step or an output is not affine in the state; None where no loop hides it."""
+        """Whether one step or an output is not affine in the state; None where no loop hides it.
+
+        Args:
+            names: of the inputs that are known. noises, readings: of the inputs through which noise enters the
+                transition and the outputs. rows: of the outputs that are measured.
+        """
         if self.substeps <= UNROLLED:
             return None
         one = replace(self, substeps=1)
@@ -191,13 +210,21 @@ class MovingSystem:
         return not (affine and is_affine(seen, n + len(readings), width_of_flat))
 
     def transition(self, names: Sequence[str], noises: Sequence[str]) -> Transition:
-        """The state a period later."""
+        """The state a period later.
+
+        Args:
+            names: of the inputs that are known. noises: of those through which noise enters.
+        """
         return lambda x, w, known, period: self._moved(
             x, self._inputs((*names, *noises), np.hstack([known.u, w])), known, period
         )
 
     def measured(self, names: Sequence[str], noises: Sequence[str], rows: Sequence[int]) -> Measured:
-        """Some outputs."""
+        """Some outputs.
+
+        Args:
+            names: of the inputs that are known. noises: of those through which noise enters. rows: of the outputs.
+        """
 
         def outputs(x: Array, v: Array, known: Known) -> Array:
             u = self._inputs((*names, *noises), np.hstack([known.u, v]))

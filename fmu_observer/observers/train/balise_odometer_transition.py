@@ -72,7 +72,11 @@ def _moves(speed: Array, p: Any) -> Array:
 
 
 def fading(speed: Array, p: Any) -> Array:
-    """Rate at which a creep fades [1/s]; a wheel that stands does not creep."""
+    """Rate at which a creep fades [1/s]; a wheel that stands does not creep.
+
+    Args:
+        speed: [m/s].
+    """
     return 1.0 / np.where(_moves(speed, p) > 0.0, p.creep_time, p.odometer_period)
 
 
