@@ -18,8 +18,10 @@ from cosim.components.component import Component
 from cosim.components.loading import COMPONENTS, load_fmu
 from fmus.fmi.standard import fmi_version
 
-MOST = 32
-"""Libraries kept at a time in a process; the one that was not used for the longest time makes way."""
+MOST = 96
+"""Libraries kept at a time in a process, more than there are observers in a choice; the one that was not used for the
+longest time makes way.
+"""
 
 
 @dataclass
