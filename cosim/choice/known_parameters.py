@@ -6,6 +6,7 @@ Runs nothing.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,14 +17,16 @@ from cosim.results.result import Result
 from cosim.run.component_models import make_declared, make_system, values_in_use
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.simulation.scenario import Scenario
+from cosim.starter.guess import in_si
 from cosim.starter.inspected_fmu import inspect_fmu
-from cosim.starter.starter_roles import PlantRoles, plant_roles
+from cosim.starter.starter_roles import plant_roles
+from cosim.starter.train_starter import DAVIS, usual_resistance
 from plant_models.hybrid import Signal
 
 Known = Mapping[str, tuple[float, str]]
 """Values by the name of a parameter, and who says so."""
 
-MASS, DAVIS = "mass", ("davis_a", "davis_b", "davis_c")
+MASS = "mass"
 _START_POSITION = ("estimated_position", "predicted_position")
 _START_SPEED = ("estimated_speed", "odometer_speed", "held_speed")
 _OF_THE_TRAIN = (MASS, *DAVIS, "wheel_radius", "wheel_inertia", "n_axles", "brake_coefficient")
@@ -31,8 +34,6 @@ _PERIOD, _SPACING = "odometer_period", "expected_spacing"
 SHARED_PARAMETERS = (*_OF_THE_TRAIN, *_START_POSITION, *_START_SPEED, _PERIOD, _SPACING)
 """What train observers want to know of the train, of its odometer and balises, and where they believe it to start."""
 
-_RESISTANCE = (0.01, 3.6e-4, 1.8365e-5)
-"""Davis coefficients by mass [N/kg], [N.s/(m.kg)], [N.s2/(m2.kg)]: those of the locomotive that ships."""
 _MOVING = 0.5  # [m/s]: from here on a run says something of mass
 
 
@@ -88,9 +89,7 @@ def derived_parameters(known: Known, parts: ScenarioParts, run: Result) -> dict[
         if mass is not None:
             found[MASS] = mass, "fitted to effort and speed of the recorded run; check it"
     if MASS in found:
-        by_mass = {
-            n: (share * found[MASS][0], "usual for this mass") for n, share in zip(DAVIS, _RESISTANCE, strict=True)
-        }
+        by_mass = {name: (value, "usual for this mass") for name, value in usual_resistance(found[MASS][0]).items()}
         found = by_mass | found
     return found
 
@@ -135,11 +134,8 @@ def _fmu_values(scenario: Scenario, table: ComponentTable) -> dict[str, float]:
     mass = plant_roles(inspected).mass
     if mass is not None and mass.signal.readable:
         named.setdefault(MASS, mass.signal)
-    found = {}
-    for name, signal in named.items():
-        value = table.parameters.get(signal.name, signal.start)
-        if isinstance(value, int | float):
-            found[name] = float(value) * (1.0 if signal.meaning is None else signal.meaning.factor)
+    stated = {n: table.parameters.get(signal.name, signal.start) for n, signal in named.items()}
+    found = {n: in_si(replace(named[n], start=float(v))) for n, v in stated.items() if isinstance(v, int | float)}
     return {name: value for name, value in found.items() if name != MASS or value > 0.0}
 
 
@@ -157,16 +153,6 @@ def _declared_period(parts: ScenarioParts) -> float | None:
     values = values_in_use(table, system)
     periods = [float(getattr(values, event.period)) for event in system.periodic_events]
     return min(periods, default=None)
-
-
-def fmu_roles(scenario: Scenario, parts: ScenarioParts) -> PlantRoles | None:
-    """What the signals of the train's FMU are; None where the train is none.
-
-    Args:
-        scenario: for paths. parts: of it.
-    """
-    fmu = parts.table.components[parts.train].fmu if parts.train else None
-    return None if fmu is None else plant_roles(inspect_fmu((scenario.folder / fmu).resolve()))
 
 
 # -- what a run shows -------------------------------------------------------------------------------------------------
@@ -214,7 +200,7 @@ def _fitted_mass(time: np.ndarray, speed: np.ndarray, effort: np.ndarray | None)
     way = np.interp(grid, time, np.concatenate(([0.0], np.cumsum(effort[:-1] * np.diff(time)))))
     v = np.interp(grid, time, speed)
     push, mean = np.diff(way), 0.5 * (v[1:] + v[:-1])
-    per_mass = np.diff(v) + sum(share * mean**power for power, share in enumerate(_RESISTANCE))
+    per_mass = np.diff(v) + sum(share * mean**power for power, share in enumerate(usual_resistance(1.0).values()))
     moving = mean > _MOVING
     weight = float(np.sum(per_mass[moving] ** 2))
     mass = float(np.sum(push[moving] * per_mass[moving]) / weight) if weight > 0.0 else 0.0

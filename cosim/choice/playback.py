@@ -7,7 +7,7 @@ the loop belongs to it too.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,9 +23,11 @@ from cosim.run.signal_roles import ROLES, roles_of_balises
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
 from cosim.simulation.scenario import Scenario
+from cosim.starter.inspected_fmu import inspect_fmu
+from cosim.starter.starter_roles import plant_roles
 from fmu_observer.observers.gated_observer import GatedObserver
 
-_ESTIMATES = ("position", "speed")
+_ESTIMATES, _EFFORT = ("position", "speed"), "effort"
 _PLAYED_MASTER = ("algorithm", "inputs", "events", "stepper", "record_memory")
 """Keys of the master table that matter to an observer that only listens: when its inputs reach it, and how."""
 
@@ -51,13 +53,14 @@ class ScenarioParts:
     Args:
         table: the scenario.
         observers: names of those that estimate position or speed of the train. plant: names of the plant side.
-        links: all connections.
+        links: all connections. effort: where the effort comes from of a train that calls it otherwise; None for none.
     """
 
     table: ScenarioTable
     observers: tuple[str, ...]
     plant: tuple[str, ...]
     links: tuple[Link, ...]
+    effort: str | None = None
 
     @property
     def in_loop(self) -> tuple[str, ...]:
@@ -106,6 +109,8 @@ class ScenarioParts:
             for signal, link in self.sources(name).items():
                 if link[0].partition(".")[0] in self.plant:
                     found.setdefault(signal, link)
+        if self.effort is not None:
+            found.setdefault(_EFFORT, (self.effort, _EFFORT))
         return found
 
 
@@ -124,7 +129,20 @@ def find_parts(scenario: Scenario) -> ScenarioParts:
     observers = tuple(name for name in table.components if name != plant and _is_observer(scenario, table, name))
     roots = [n for n, t in table.components.items() if n not in observers and t.observer is None]
     roots += [link[0].partition(".")[0] for link in links if link[1].partition(".")[0] in observers]
-    return ScenarioParts(table, observers, _ancestors(roots, links, table.components), links)
+    parts = ScenarioParts(table, observers, _ancestors(roots, links, table.components), links)
+    return replace(parts, effort=_effort_of_fmu(scenario, parts))
+
+
+def _effort_of_fmu(scenario: Scenario, parts: ScenarioParts) -> str | None:
+    """What drives the train's FMU, or its output that reports the effort, as far as their names say so."""
+    fmu = parts.table.components[parts.train].fmu if parts.train else None
+    if fmu is None:
+        return None
+    roles = plant_roles(inspect_fmu((scenario.folder / fmu).resolve()))
+    if roles.effort is not None:
+        link = parts.sources(parts.train).get(roles.effort.signal.name)
+        return None if link is None else link[0]
+    return None if roles.applied is None else f"{parts.train}.{roles.applied.signal.name}"
 
 
 def _is_observer(scenario: Scenario, table: ScenarioTable, name: str) -> bool:

@@ -31,7 +31,7 @@ ARGUMENTS = (
     argument(
         "--observer",
         metavar="NAME",
-        help="observer to put beside it, a name or file.py:Class (default: takagi_sugeno_cdo)",
+        help="observer to put beside it, a name or file.py:Class (default: quasi_lpv_uio, or odometer_reset)",
     ),
     argument("--force", action="store_true", help="replace a file that exists"),
 )

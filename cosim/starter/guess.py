@@ -244,3 +244,12 @@ def _denied(quantity: Quantity, signal: GuessedSignal) -> int:
     if WORDS[_key(quantity)] & name or quantity == "effort":
         return 0  # what is named plainly may be described beside other things
     return _DENIED if set(_words_of(signal.description)) & against else 0
+
+
+def in_si(signal: GuessedSignal) -> float:
+    """Start value of a signal in SI units, as it stands where it declares none; 0 without one.
+
+    Args:
+        signal: of an FMU.
+    """
+    return (signal.start or 0.0) * (1.0 if signal.meaning is None else signal.meaning.factor)

@@ -18,14 +18,14 @@ from cosim.starter.guess import Guess
 from cosim.starter.inspected_fmu import InspectedFmu, inspect_fmu, number
 from cosim.starter.starter_roles import ObserverRoles, PlantRoles, is_observer, observer_roles, plant_roles
 from cosim.starter.toml_lines import LISTED, GuessedLink, comment, entry, guessed, inline, listing, one_line
-from cosim.starter.train_starter import DEFAULT_OBSERVER, declared_observer, train, train_times
+from cosim.starter.train_starter import declared_observer, default_observer, train, train_times
 from fmu_observer import OBSERVERS
 from fmus.fmi.types import NUMERIC_TYPES
 from fmus.templates import environment
 from plant_models.user_file import names_code
 
-_WANTED = frozenset({"effort", "odometer"})
-"""Inputs of the observers that a starter can connect."""
+_WANTED = "odometer"
+"""Input that an observer must have for a starter to connect it."""
 
 
 STOP, STEP, STEPS = 10.0, 0.01, 1000
@@ -146,22 +146,23 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
     Args:
         fmu: path of the FMU.
         target: the scenario file to be; paths in the text are relative to it.
-        observer: name of the observer to put beside a plant, or ``file.py:Class``; by default the Takagi-Sugeno
-            observer.
+        observer: name of the observer to put beside a plant, or ``file.py:Class``; by default `quasi_lpv_uio`, and
+            `odometer_reset` beside a plant without an effort.
 
     Returns:
         The text of the file, and what the user should know.
 
     Raises:
         FmuLoadError: the FMU cannot be read, or offers no co-simulation.
-        ScenarioError: there is no such observer, or it does not listen to an effort and an odometer.
+        ScenarioError: there is no such observer, or it does not listen to an odometer.
     """
     _check_observer(observer)
     path, target = Path(fmu), Path(target)
     inspected = inspect_fmu(path)
     place = relative(path, target.parent)
-    written = move_file(observer or DEFAULT_OBSERVER, lambda file: relative(file, target.parent))
-    roles, beside = plant_roles(inspected), observer or DEFAULT_OBSERVER
+    roles = plant_roles(inspected)
+    beside = observer or default_observer(roles)
+    written = move_file(beside, lambda file: relative(file, target.parent))
     if is_observer(inspected):
         kind, values = "observer", _observer_beside(inspected, observer_roles(inspected))
     elif roles.is_train:
@@ -182,8 +183,8 @@ def write_starter(fmu: str | Path, target: str | Path, observer: str | None = No
     Args:
         fmu: path of the FMU.
         target: the scenario file; paths in it are relative to it.
-        observer: name of the observer to put beside a plant, or ``file.py:Class``; by default the Takagi-Sugeno
-            observer.
+        observer: name of the observer to put beside a plant, or ``file.py:Class``; by default `quasi_lpv_uio`, and
+            `odometer_reset` beside a plant without an effort.
         force: replace a file that exists.
 
     Returns:
@@ -192,7 +193,7 @@ def write_starter(fmu: str | Path, target: str | Path, observer: str | None = No
     Raises:
         OutputError: the file exists, or cannot be written.
         FmuLoadError: the FMU cannot be read, or offers no co-simulation.
-        ScenarioError: there is no such observer, or it does not listen to an effort and an odometer.
+        ScenarioError: there is no such observer, or it does not listen to an odometer.
     """
     target = Path(target)
     if target.suffix != ".toml":
@@ -223,16 +224,14 @@ def _check_observer(observer: str | None) -> None:
     if observer is None:
         return
     known = names_code(observer) or observer in OBSERVERS
-    if not (known and {s.name for s in declared_observer(observer).inputs} >= _WANTED):
+    if not (known and _WANTED in {s.name for s in declared_observer(observer).inputs}):
         able = [name for name in OBSERVERS if _listens(name)]
-        raise ScenarioError(
-            f"No observer {observer!r} that listens to an effort and an odometer; {nearest(observer, able)}"
-        )
+        raise ScenarioError(f"No observer {observer!r} that listens to an odometer; {nearest(observer, able)}")
 
 
 def _listens(name: str) -> bool:
     try:
-        return {s.name for s in declared_observer(name).inputs} >= _WANTED
+        return _WANTED in {s.name for s in declared_observer(name).inputs}
     except ScenarioError:  # of an installed package that is wrong
         return False
 

@@ -2,25 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from typing import Any
 
 from cosim.run.component_models import make_declared
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import step_count
-from cosim.starter.guess import Guess, fits
+from cosim.starter.guess import Guess, fits, in_si
 from cosim.starter.inspected_fmu import InspectedFmu, number
 from cosim.starter.starter_roles import PlantRoles
 from cosim.starter.toml_lines import GuessedLink, guessed, one_line
 from fmus.fmi.capabilities import read_capabilities
 
 PLANT, OBSERVER = "plant", "observer"
-DEFAULT_OBSERVER = "takagi_sugeno_cdo"
+DEFAULT_OBSERVER, WITHOUT_EFFORT, DENSE = "quasi_lpv_uio", "odometer_reset", "differentiator_cdo"
+"""What a stranger gets: beside an effort, without one, and for balises every 1.5 s and denser."""
 HORIZON, STEP, SHORTEST, LONGEST = 60.0, 0.01, 1e-3, 0.5
-RADIUS = 0.5
-PRESETS = {DEFAULT_OBSERVER: "long_gaps"}
+RADIUS, PERIOD = 0.5, 0.01
+PRESETS = {"takagi_sugeno_cdo": "long_gaps"}
 """What is offered beside balises laid by distance, whose gaps nobody knows beforehand: gains that no gap makes
 unstable.
 """
+USUAL_MASS = 90e3  # [kg]
+DAVIS = ("davis_a", "davis_b", "davis_c")
+_RESISTANCE = (0.01, 3.6e-4, 1.8365e-5)
+"""Davis coefficients by mass [N/kg], [N.s/(m.kg)], [N.s2/(m2.kg)]: those of the locomotive that ships."""
+
+
+def usual_resistance(mass: float) -> dict[str, float]:
+    """Davis coefficients that are usual for a mass, by name.
+
+    Args:
+        mass: of the train [kg].
+    """
+    return {name: share * mass for name, share in zip(DAVIS, _RESISTANCE, strict=True)}
+
+
+def default_observer(roles: PlantRoles) -> str:
+    """The observer for a plant of which nobody says more.
+
+    Args:
+        roles: what its signals were guessed to be.
+    """
+    return WITHOUT_EFFORT if roles.effort is None and roles.applied is None else DEFAULT_OBSERVER
 
 
 def train(inspected: InspectedFmu, roles: PlantRoles, observer: str, place: str) -> dict[str, Any]:
@@ -36,6 +60,7 @@ def train(inspected: InspectedFmu, roles: PlantRoles, observer: str, place: str)
     """
     stop, step, source = train_times(inspected)
     declared = declared_observer(observer)
+    known = {signal.name for signal in (*declared.parameter_signals, *getattr(declared, "states", ()))}
     driven = roles.effort.signal.name if roles.effort else None
     needed = {"position": roles.position, "speed": roles.speed}
     return {
@@ -43,15 +68,42 @@ def train(inspected: InspectedFmu, roles: PlantRoles, observer: str, place: str)
         "stop": stop,
         "step": step,
         "source": source,
-        "links": _links(roles),
+        "links": _links(roles, {signal.name for signal in declared.inputs}),
         "roles": roles,
         "others": [s for s in inspected.inputs if s.name != driven],
         "settings": [s for s in inspected.parameters if s.start is not None and not s.name.endswith("]")],
         "observer": place,
+        "period": PERIOD,
+        "dense": DENSE,
         "preset": PRESETS.get(observer),
-        "known": {s.name: s.start for s in (*declared.parameter_signals, *getattr(declared, "states", ()))},
+        "believed": [line for line in _believed(inspected, roles) if line[0] in known],
         "lacking": [what for what, found in needed.items() if found is None or not found.signal.readable],
     }
+
+
+def _believed(inspected: InspectedFmu, roles: PlantRoles) -> list[tuple[str, float, str]]:
+    """What an observer is to know of the train: parameter, value, and a remark."""
+    lines = [_mass(roles)]
+    parameters = {signal.name: signal for signal in inspected.parameters if signal.start is not None}
+    for name, value in usual_resistance(lines[0][1]).items():
+        if name in parameters:
+            lines.append((name, in_si(parameters[name]), f"start value of {name}"))
+        else:
+            lines.append((name, float(f"{value:.3g}"), "usual for this mass: WRITE THE RESISTANCE OF YOUR TRAIN"))
+    lines.append(("odometer_period", PERIOD, "[s] of the odometer above"))
+    return [*lines, ("estimated_speed", 0.0, "[m/s] what it believes at the start")]
+
+
+def _mass(roles: PlantRoles) -> tuple[str, float, str]:
+    """The mass, its value [kg], and where it comes from."""
+    signal = roles.mass.signal if roles.mass is not None else None
+    if roles.mass is None or signal is None or not signal.start or signal.start < 0.0:
+        return "mass", USUAL_MASS, "[kg] WRITE THE MASS OF YOUR TRAIN: the FMU has no parameter that looks like it"
+    return (
+        "mass",
+        in_si(signal),
+        f"[kg] start value of {one_line(signal.name)}; {guessed(roles.mass).removeprefix('  # ')}",
+    )
 
 
 def declared_observer(name: str) -> Any:
@@ -94,24 +146,20 @@ def train_times(inspected: InspectedFmu) -> tuple[float, float, str]:
 # -- connections ------------------------------------------------------------------------------------------------------
 
 
-def _links(roles: PlantRoles) -> list[GuessedLink]:
+def _links(roles: PlantRoles, wanted: Set[str]) -> list[GuessedLink]:
+    """Connections of the train, its odometer and its driver, and to the inputs that an observer wants."""
     links: list[GuessedLink] = []
+    effort = f"{OBSERVER}.effort"
     if roles.effort is not None:
         links.append(_from_driver(roles.effort))
-    elif roles.applied is not None:
-        links.append(
-            GuessedLink(
-                f"{PLANT}.{roles.applied.signal.name}",
-                [f"{OBSERVER}.effort"],
-                guessed(roles.applied),
-                _factor(roles.applied),
-            )
-        )
+    elif roles.applied is not None and "effort" in wanted:
+        found = roles.applied
+        links.append(GuessedLink(f"{PLANT}.{found.signal.name}", [effort], guessed(found), _factor(found)))
     links.append(_to_odometer(roles))
     readers = ["driver.odometer"] if roles.effort is not None else []
     links.append(GuessedLink("odometer.reading", [*readers, f"{OBSERVER}.odometer"]))
-    if roles.effort is not None:
-        links.append(GuessedLink("driver.effort", [f"{OBSERVER}.effort"]))
+    if roles.effort is not None and "effort" in wanted:
+        links.append(GuessedLink("driver.effort", [effort]))
     return links
 
 

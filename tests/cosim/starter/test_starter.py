@@ -169,6 +169,25 @@ def test_a_train_without_effort_has_no_driver(tmp_path: Path) -> None:
     assert "plant.traction_force -> observer.effort" in table.connections
 
 
+def test_the_observer_beside_a_plant_is_told_all_that_is_known(tmp_path: Path) -> None:
+    """In place of its own defaults, which are those of a train of 1 kg."""
+    masses = Variable("Masse", 4, "parameter", start=420.0, unit="t"), Variable("davis_b", 5, "parameter", start=77.0)
+    write_starter(
+        described(tmp_path, into("F", 1, "N"), out("s", 2, "m"), out("v", 3, "m/s"), *masses), tmp_path / "m.toml"
+    )
+    observer = valid(tmp_path / "m.toml").table().components["observer"]
+    assert observer.observer == "quasi_lpv_uio"
+    told = {"mass": 420e3, "davis_a": 4200.0, "davis_b": 77.0, "odometer_period": 0.01}
+    assert {name: observer.parameters[name] for name in told} == told
+
+
+def test_without_an_effort_the_odometer_is_reset_at_balises(tmp_path: Path) -> None:
+    write_starter(described(tmp_path, out("position", 1, "m"), out("speed", 2, "m/s")), tmp_path / "mine.toml")
+    table = valid(tmp_path / "mine.toml").table()
+    assert table.components["observer"].observer == "odometer_reset"
+    assert not [c for c in table.connections if "effort" in str(c)]
+
+
 def test_a_wheel_that_turns_is_multiplied_by_a_radius_to_be_written(tmp_path: Path) -> None:
     fmu = described(tmp_path, into("F", 1, "N"), out("s", 2, "m"), out("v", 3, "m/s"), out("axle.speed", 4, "rpm"))
     made = write_starter(fmu, tmp_path / "mine.toml")
