@@ -14,7 +14,7 @@ from cosim.choice.benchmark import ObserverBenchmark, benchmark_observers
 from cosim.choice.candidates import BenchmarkCandidate
 from cosim.choice.choice import Choice
 from cosim.choice.disturbances import Disturbance, Journey, drawn
-from cosim.choice.ranking import Row, ranked
+from cosim.choice.ranking import NOTHING, Row, ranked
 from cosim.errors import RunError, ScenarioError
 from cosim.runs.engine import run_jobs
 from cosim.runs.executors import make_executor
@@ -168,10 +168,18 @@ def _tried(
             for done in run_jobs(trials, executor, progress=lambda number, _all: report(number)):
                 if done.row is None and done.failure is not None:
                     raise RunError(f"A disturbed run failed: {done.failure.reason}")
+                _require_any(done.row)
                 found[done.number] = done.row
     except KeyboardInterrupt:
         return [found[number] for number in sorted(found)], True
     return [found[number] for number in sorted(found)], False
+
+
+def _require_any(benchmark: ObserverBenchmark) -> None:
+    """Raise a RunError where a disturbed run could not be set up at all."""
+    if all(score.used is None for score in benchmark.scores):
+        reason = next((score.failure for score in benchmark.scores), "no observer")
+        raise RunError(f"The run '{benchmark.disturbance.name}' failed for every observer: {reason}")
 
 
 def _row(name: str, found: Sequence[ObserverBenchmark]) -> Row:
@@ -182,9 +190,9 @@ def _row(name: str, found: Sequence[ObserverBenchmark]) -> Row:
     for benchmark in found:
         run = benchmark.disturbance.name
         score = next((score for score in benchmark.scores if score.name == name), None)
-        if score is None or score.used is None:
+        if score is None or (score.used is None and benchmark is found[0]):
             continue
-        (harder if _is_harder(benchmark.disturbance) else used)[run] = score.used
+        (harder if _is_harder(benchmark.disturbance) else used)[run] = score.used or NOTHING
         if score.failure is not None and not _is_harder(benchmark.disturbance):
             failures[run] = score.failure
     nominal = found[0]

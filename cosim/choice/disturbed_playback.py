@@ -8,9 +8,10 @@ from typing import Any
 
 from cosim.choice.candidates import BenchmarkCandidate
 from cosim.choice.disturbances import GRAVITY, Disturbance, Fault
-from cosim.choice.known_parameters import DAVIS, MASS, Known
+from cosim.choice.known_parameters import MASS, Known
 from cosim.choice.playback import ScenarioParts
 from cosim.run.component_models import make_system, values_in_use
+from cosim.starter.train_starter import DAVIS
 
 _EFFORT, _WHEEL, _ODOMETER = "disturbed_effort", "disturbed_wheel", "disturbed_odometer"
 
@@ -49,21 +50,21 @@ def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> li
 def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> Channel:
     """On a slope a train of the same motion needs ``m g i`` more."""
     slopes = disturbance.slopes
-    given = {
+    stated = {
         "fault_onset": [slope.onset for slope in slopes],
         "fault_length": [slope.length for slope in slopes],
         "fault_offset": [mass * GRAVITY * slope.gradient for slope in slopes],
     }
     options = {"fault_count": len(slopes), "unit": "N"}
-    table = {"model": "signal_fault", "options": options, "parameters": given}
+    table = {"model": "signal_fault", "options": options, "parameters": stated}
     return Channel(source, f"{_EFFORT}.reading", {_EFFORT: table}, [f"{source} -> {_EFFORT}.healthy"])
 
 
 def _odometer_channel(source: str, disturbance: Disturbance, period: float) -> Channel:
     """A wheel that jams and skids, and an odometer that is worn and noisy."""
     faults = disturbance.faults or (Fault(0.0, 0.0, 0.0, -1.0),)
-    given = {f"fault_{key}": [getattr(fault, key) for fault in faults] for key in ("onset", "length", "depth", "kind")}
-    wheel = {"model": "wheel_fault", "options": {"cause": "given", "fault_count": len(faults)}, "parameters": given}
+    stated = {f"fault_{key}": [getattr(fault, key) for fault in faults] for key in ("onset", "length", "depth", "kind")}
+    wheel = {"model": "wheel_fault", "options": {"cause": "stated", "fault_count": len(faults)}, "parameters": stated}
     odometer = {"model": "odometer", "parameters": {"sample_period": period, "noise_std": disturbance.noise}}
     lines = [
         {"from": source, "to": f"{_WHEEL}.speed", "factor": disturbance.wheel},
@@ -78,6 +79,8 @@ def disturbed(data: dict[str, Any], found: Sequence[Channel], disturbance: Distu
     Args:
         data: tables that play a recording back. found: the channels. disturbance: what is wrong.
     """
+    heard_of = {_source(line) for line in data["connections"]}
+    found = [channel for channel in found if channel.source in heard_of]
     heard = {channel.source: channel.output for channel in found}
     changed = dict(data)
     changed["components"] = data["components"] | {n: dict(t) for c in found for n, t in c.components.items()}
@@ -94,12 +97,17 @@ def disturbed(data: dict[str, Any], found: Sequence[Channel], disturbance: Distu
     return changed
 
 
+def _source(line: str | dict[str, Any]) -> str:
+    """Where a connection comes from."""
+    return str(line["from"]) if isinstance(line, dict) else line.partition(" -> ")[0]
+
+
 def _moved(line: str | dict[str, Any], heard: Mapping[str, str]) -> str | dict[str, Any]:
     """A connection from what observers hear in place of the recorded signal."""
+    source = _source(line)
     if isinstance(line, dict):
-        return line | {"from": heard.get(line["from"], line["from"])}
-    source, arrow, target = line.partition(" -> ")
-    return heard.get(source, source) + arrow + target
+        return line | {"from": heard.get(source, source)}
+    return heard.get(source, source) + line.removeprefix(source)
 
 
 def believing(candidate: BenchmarkCandidate, disturbance: Disturbance) -> BenchmarkCandidate:

@@ -13,7 +13,8 @@ from fmus.tables.numbers import number
 
 TIE = 0.1
 """Share of the allowance below which two observers do not differ [1]."""
-_NOTHING = UsedAllowance(inf, 0.0, inf, inf)
+NOTHING = UsedAllowance(inf, 0.0, inf, inf)
+"""Of an observer that fails: more than there is."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,8 @@ class Row:
     def worst(self) -> tuple[str, UsedAllowance]:
         """The run in which it uses most of the allowance, and how much; one that fails uses more than there is."""
         if not self.used:
-            return "", _NOTHING
-        failed = {name: _NOTHING for name in self.failures if name in self.used}
+            return "", NOTHING
+        failed = {name: NOTHING for name in self.failures if name in self.used}
         every = {**self.used, **failed}
         name = max(every, key=lambda name: every[name].share)
         return name, every[name]

@@ -171,7 +171,7 @@ class Train:
         ]
         table["components"]["wheel"] = {
             "model": "wheel_fault",
-            "options": {"cause": "given", "fault_count": 16},
+            "options": {"cause": "stated", "fault_count": 16},
             "parameters": self._faults(rng),
         }
         return Scenario(**table)
