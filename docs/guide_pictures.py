@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import cosim.cli
 import fmus
 from cosim import Outcome, Scenario
 from cosim.drawing.style import BLUE, TIME, TRUE_LINE, VERMILION, ZONE, new_figure, styled
@@ -124,24 +125,38 @@ def spacings(path: Path) -> None:
 
 
 def page(path: Path) -> None:
-    """The first screen of the page of the first run, as a browser shows it.
+    """The first screen of the page of the first run, as a browser shows it."""
+    photograph(ran("freight_profile_d").write("results")["report"], path)
+
+
+def comparison(path: Path) -> None:
+    """The first screen of the page that compares the first run with that of the printed gains."""
+    changed = {"stop": 30.0, "takagi_sugeno_cdo.preset": "as_published"}
+    for name, changes in (("first", {"stop": 30.0}), ("published", changed)):
+        ran("freight_profile_d", changes).write(f"results/{name}", report=False)
+    cosim.cli.main(["compare", "results/first", "results/published", "--html", "comparison.html", "--quiet"])
+    photograph(Path("comparison.html"), path)
+
+
+def photograph(html: Path, path: Path) -> None:
+    """Save the first screen of a page.
 
     Raises:
-        RuntimeError: there is no Chromium, or it left no picture.
+        RuntimeError: there is no Chromium.
     """
     browser = os.environ.get("CHROMIUM") or shutil.which("chromium")
-    report = ran("freight_profile_d").write("results")["report"]
     if browser is None:
         raise RuntimeError("install Chromium, or name a browser by $CHROMIUM")
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--virtual-time-budget=8000"]
-    size, target = "--window-size=1000,1000", f"--screenshot={path}"
-    subprocess.run([browser, *options, size, target, report.resolve().as_uri()], check=True, capture_output=True)
+    size, target = "--window-size=1000,900", f"--screenshot={path}"
+    subprocess.run([browser, *options, size, target, html.resolve().as_uri()], check=True, capture_output=True)
     small_picture.shrink(path)
 
 
 DRAWN: dict[str, tuple[str, Callable[[Path], None]]] = {
     "structure": ("first_run", structure),
     "page": ("first_run", page),
+    "comparison": ("first_run", comparison),
     "exact_and_stale": ("scenarios", exact_and_stale),
     "jam": ("scenarios", jam),
     "spacings": ("studies", spacings),
