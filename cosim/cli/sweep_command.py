@@ -84,7 +84,9 @@ def execute(options: argparse.Namespace) -> Output:
     table = result.shown() if options.by is None else studies.groups_table(result, options.by)
     ending = f"{len(result) - len(result.failed)} of {len(result)} runs done: {directory}"
     data = json.loads((directory / "index.json").read_text(encoding="utf-8"))
-    return Output([table, ending], data, code=_SOME_FAILED if result.failed else DONE)
+    if result.failed:
+        return Output([table], data, code=_SOME_FAILED, verdict=ending, role="bad")
+    return Output([table], data, verdict=ending)
 
 
 def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:

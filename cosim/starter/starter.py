@@ -198,9 +198,9 @@ def write_starter(fmu: str | Path, target: str | Path, observer: str | None = No
     target = Path(target)
     if target.suffix != ".toml":
         raise OutputError(f"{target}: a scenario file ends in .toml.")
+    made = starter(fmu, target, observer)  # first, since without an FMU there is nothing to write
     if target.exists() and not force:
         raise OutputError(f"{target} exists already; choose another name with -o, or replace it with --force.")
-    made = starter(fmu, target, observer)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(made.text, encoding="utf-8")

@@ -172,6 +172,7 @@ COMMANDS = {
     "info vendr.fmu": "FMU vendr.fmu does not exist; did you mean 'vendor.fmu'?",
     "info own.toml": "own.toml is a scenario",
     "new vendr.fmu": "FMU vendr.fmu does not exist; did you mean 'vendor.fmu'?",
+    "new own.fmu": "FMU own.fmu does not exist; in that folder there is: vendor.fmu.",
     "compare own.toml own.toml": "own.toml is a scenario, which 'cosim run' runs; expected a results folder",
     "report vendor.fmu": "vendor.fmu is an FMU; expected a results folder or a table.",
     "rerun own.toml": "own.toml is a file; expected a results folder",
