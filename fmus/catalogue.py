@@ -74,7 +74,10 @@ def catalogue() -> dict[str, CatalogueEntry]:
     """All models by name: plants first, then observers."""
     shipped = [name for registry in (PLANTS, OBSERVERS) for name in registry if registry.room(name)]
     others = [(registry, name) for registry in (PLANTS, OBSERVERS) for name in registry if not registry.room(name)]
-    known = {data["name"]: _entry(data) for data in remembered("catalogue", _key(shipped), lambda: _read(shipped))}
+    try:
+        known = {data["name"]: _entry(data) for data in remembered("catalogue", _key(shipped), lambda: _read(shipped))}
+    except (RegistryError, ModuleNotFoundError):  # of an installation without a package that some models need
+        others, known = [(r, name) for r in (PLANTS, OBSERVERS) for name in r], {}
     known |= {name: _entry_of_others(registry, name) for registry, name in others}
     return {name: known[name] for registry in (PLANTS, OBSERVERS) for name in registry}
 

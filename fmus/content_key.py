@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
-import casadi as ca
-
 from fmus.build import BuildPlan, runtime_sources, standard_headers
 from fmus.toolchain.targets import Target
+from plant_models.hybrid.casadi_package import ca
 
 
 def content_key(plan: BuildPlan, targets: Sequence[Target]) -> str:

@@ -6,14 +6,18 @@ import traceback
 from difflib import get_close_matches
 from pathlib import Path
 
+from plant_models.missing_package import missing_package
+
 
 def explained(error: BaseException, path: Path | str | None = None) -> str:
     """An error of a user's code in one line: its kind, its message, and the file and line that it comes from; where a
-    name is not defined, the nearest one that is.
+    name is not defined, the nearest one that is; where a package is not installed, how to install it.
 
     Args:
         error: what was raised. path: of the user's file, whose last line on the way is named; None for the last of all.
     """
+    if missing := missing_package(error):
+        return missing
     text = f"{type(error).__name__}: {error}{_nearest(error)}".removesuffix(": ")
     if isinstance(error, SyntaxError) and error.filename:
         return f"SyntaxError: {error.msg} ({error.filename}:{error.lineno})"

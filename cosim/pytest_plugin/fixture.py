@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 import re
 from hashlib import sha256
 
+from plant_models.missing_package import missing_package
+
 UPDATE = "If the new outputs are right, accept them with: pytest --fmu-baseline=update"
 
 
@@ -117,8 +119,10 @@ class FmuRegression:
         try:
             call = Call.run(what, self._file.parent, path, **compared, **run)
             return self._update(call) if options.mode(self._config) == "update" else self._check(call)
-        except CosimError as error:
-            reason = str(error)
+        except (CosimError, ModuleNotFoundError) as error:
+            reason = str(error) if isinstance(error, CosimError) else missing_package(error)
+            if not reason:
+                raise
             self._keep(path, *(("error", [reason]) if path.exists() else ("missing", [])))
         pytest.fail(f"fmu_regression: {reason}", pytrace=False)  # outside of the handler: no traceback of ours
 
@@ -182,7 +186,7 @@ class FmuRegression:
             (root / ".gitignore").write_text("*\n", encoding="utf-8")
             return {kind: self._shown(file) for kind, file in write_comparison(found, folder, pictures=True).items()}
         except Exception as error:  # the difference must be reported, whatever happens to its picture
-            return {"picture": f"could not be made: {error}"}
+            return {"picture": f"could not be made: {missing_package(error) or error}"}
 
     def _artifacts(self, path: Path) -> Path:
         return options.artifacts_folder(self._config) / self._file.stem / path.stem

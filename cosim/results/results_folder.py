@@ -19,10 +19,10 @@ from cosim.errors import OutputError
 from cosim.results.block_file import BLOCK_FILE, read_block
 from cosim.results.formats.growing_npy import read_grown
 from cosim.results.formats.known_formats import FORMATS, check_formats, fastest_first, table_files, usual_file
-from cosim.results.optional import is_installed
 from cosim.results.record_rows import PACKET_ROWS, TELEGRAM_ROWS, Record, RecordRows
 from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.summary_file import read_summary, write_summary
+from plant_models.missing_package import is_installed
 
 EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
 PACKETS = "packets.csv"  # of runs with a network

@@ -35,7 +35,7 @@ def to_pandas(result: ResultData, signals: Iterable[str] | None = None) -> Any:
     Raises:
         KeyError: a signal was not recorded. OutputError: pandas is not installed.
     """
-    pandas = optional_module("pandas", "frames", "Data frames")
+    pandas = optional_module("pandas", "Data frames")
     chosen = _chosen(result, signals)
     names = [signal.name for signal in chosen]
     values = np.empty((len(result.table), len(names)))
@@ -75,7 +75,7 @@ def events_to_pandas(result: ResultData) -> Any:
     Raises:
         OutputError: pandas is not installed.
     """
-    frame = optional_module("pandas", "frames", "Data frames").DataFrame(_event_columns(result))
+    frame = optional_module("pandas", "Data frames").DataFrame(_event_columns(result))
     frame.attrs["units"] = dict(TELEGRAM_UNITS)
     return frame
 
@@ -94,7 +94,7 @@ def to_xarray(result: ResultData, signals: Iterable[str] | None = None) -> Any:
     Raises:
         KeyError: a signal was not recorded. OutputError: xarray is not installed.
     """
-    xarray = optional_module("xarray", "frames", "Data sets")
+    xarray = optional_module("xarray", "Data sets")
     variables: dict[str, Any] = {
         s.name: ("time", np.array(result[s.name]), _attributes(s)) for s in _chosen(result, signals)
     }

@@ -19,6 +19,7 @@ from fmus.cache import CacheEntry, cache_entry
 from fmus.toolchain.compile import CompilerMissing, find_compiler
 from fmus.toolchain.platforms import Platform
 from plant_models.hybrid import HybridSystem, TracingError
+from plant_models.missing_package import installation, is_installed
 
 if TYPE_CHECKING:
     from fmus.build import BuildDraft
@@ -70,7 +71,7 @@ def intended(table: ComponentTable, system: HybridSystem) -> Backend:
     """
     if table.backend is not None:
         return table.backend
-    return NATIVE if system.traceable and _missing_compiler() is None else _IN_PYTHON
+    return NATIVE if system.traceable and _missing_tool() is None else _IN_PYTHON
 
 
 def realise(requests: Mapping[str, Request], notify: Notify) -> Realised:
@@ -108,8 +109,10 @@ def cannot_build(where: str, system: HybridSystem, fault: Exception) -> FmuLoadE
 # -----------------------------------------------------------------------------------------------------------
 
 
-def _missing_compiler() -> str | None:
-    """Why there is no compiler, or None."""
+def _missing_tool() -> str | None:
+    """Which tool that native FMUs are built with is missing, and what to do, or None."""
+    if not is_installed("casadi"):
+        return f"Tracing them needs the package casadi; {installation('casadi')}."
     try:
         find_compiler()
     except CompilerMissing as error:
@@ -118,7 +121,12 @@ def _missing_compiler() -> str | None:
 
 
 def _note(requests: Mapping[str, Request], made: Realised, faults: Mapping[str, Exception]) -> None:
-    """Say why models are blocks that nobody asked to be blocks."""
+    """Say why models are blocks that nobody asked to be blocks, and why all blocks are slow without CasADi."""
+    if not is_installed("casadi"):
+        python = [name for name, kind in made.kinds.items() if kind.startswith("block")]
+        if python:
+            made.notes.append(f"Run in plain NumPy, many times slower: {', '.join(python)}. {_missing_tool()}")
+        return
     blocks = [name for name, kind in made.kinds.items() if kind == _IN_PYTHON and requests[name].table.backend is None]
     opaque = [name for name in blocks if not requests[name].system.traceable]
     if opaque:
@@ -127,7 +135,7 @@ def _note(requests: Mapping[str, Request], made: Realised, faults: Mapping[str, 
         made.notes.append(f"{name} runs as a Python block, as its FMU cannot be built: {fault}")
     others = [name for name in blocks if name not in opaque and name not in faults]
     if others:
-        made.notes.append(f"Run as Python blocks, which is slower: {', '.join(others)}. {_missing_compiler()}")
+        made.notes.append(f"Run as Python blocks, which is slower: {', '.join(others)}. {_missing_tool()}")
 
 
 # -- building

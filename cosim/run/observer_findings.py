@@ -20,6 +20,7 @@ from fmu_observer.certificates.gap_findings import CONSTANT_GAP, DECREASE, GROWT
 from fmu_observer.observers.evaluated_observer import OTHER_GAINS
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity
+from plant_models.missing_package import MissingPackageError
 
 _WALKING = 1.0
 """Who is stable for the gaps of a train at this speed [m/s] is stable for all that a moving train meets."""
@@ -118,7 +119,10 @@ def evaluated(name: str, table: ComponentTable, system: Any, gap: ExpectedGap | 
         found, warnings = _evaluated(name, table, system, gap)
         return None if found is None else asdict(found), warnings
 
-    fields, warnings = remembered("finding", key, evaluate)
+    try:
+        fields, warnings = remembered("finding", key, evaluate)
+    except MissingPackageError as error:
+        return None, [f"what is certified is not known. {error}."]
     return None if fields is None else Finding.of(fields), warnings
 
 

@@ -27,6 +27,7 @@ from cosim.runs.job import Ended, Failure, Job
 from cosim.runs.keys import digest, version_text
 from cosim.runs.workers import Team
 from plant_models.explained_error import explained
+from plant_models.missing_package import installation
 
 try:
     import cloudpickle
@@ -92,7 +93,7 @@ class Cluster(AbstractContextManager["Cluster"]):
 
     def __init__(self, address: str) -> None:
         if distributed is None:
-            raise OutputError("--scheduler needs dask.distributed: pip install 'fmu-observer[cluster]'")
+            raise OutputError(f"--scheduler needs dask.distributed: {installation('distributed')}")
         self.address = address
         try:
             self._client = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)

@@ -122,7 +122,7 @@ class SweepRuns(FirstScreen):
         Raises:
             OutputError: pandas is not installed.
         """
-        return optional_module("pandas", "frames", "Data frames").DataFrame(self.table()).set_index("run")
+        return optional_module("pandas", "Data frames").DataFrame(self.table()).set_index("run")
 
     def shown(self) -> Table:
         """The settings and the chosen measures of each run, failures in words below."""

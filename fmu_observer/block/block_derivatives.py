@@ -16,6 +16,7 @@ from fmpy.model_description import ModelVariable
 from fmu_observer.block.block_variables import BlockError
 from fmu_observer.description import VariableTable, exposed_inputs, referenced
 from plant_models.hybrid import HybridSystem, Runtime, TracedSystem, traced_once, width
+from plant_models.hybrid.casadi_package import demand_casadi
 
 
 class BlockSensitivity:
@@ -50,6 +51,7 @@ class BlockSensitivity:
             equations
                 have no finite derivative here.
         """
+        demand_casadi()
         if not self.system.traceable:
             raise BlockError(f"{self.system.name} cannot be traced, so it has no directional derivatives.")
         if len(seed) != len(knowns):

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from math import inf, sqrt
 from typing import TypeVar
 
-import clarabel
 import numpy as np
 import scipy
 
 from plant_models.hybrid import Array
+from plant_models.missing_package import optional_package
 
 _Worst = TypeVar("_Worst")
 
@@ -186,6 +186,7 @@ def _solve(matrix: np.ndarray, n: int, inequalities: int) -> np.ndarray:
     right[0] = n
     cost = np.zeros(variables)
     cost[-1] = -1.0
+    clarabel = optional_package("clarabel", "A certificate by a common quadratic Lyapunov function")
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     cones = [clarabel.ZeroConeT(1), *(clarabel.PSDTriangleConeT(n) for _ in range(inequalities + 1))]

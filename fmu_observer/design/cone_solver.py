@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fmu_observer.certificates.bisection import bisected
+from plant_models.missing_package import optional_package
 
 Matrix = Any  # a NumPy array, or a solver's expression with the same operators
 Rows = list[list[Matrix]]
@@ -55,11 +56,7 @@ def load_cvxpy(purpose: str) -> Any:
     Raises:
         ImportError: it is not installed; the message says how to.
     """
-    try:
-        import cvxpy  # noqa: PLC0415 - only who designs pays for it
-    except ImportError as error:
-        raise ImportError(f"{purpose} needs cvxpy: pip install 'fmu-observer[lmi]'.") from error
-    return cvxpy
+    return optional_package("cvxpy", purpose)  # only who designs pays for it
 
 
 def solved(cp: Any, question: Any, **settings: float) -> bool:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from plant_models.hybrid import HybridSystem, PeriodicEvent, scalar_names
+from plant_models.hybrid.casadi_package import ca
 from plant_models.hybrid.tracing import TracedSystem
 
 Array = NDArray[np.float64]

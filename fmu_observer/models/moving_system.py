@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, inf
 
-import casadi as ca
 import numpy as np
 
 from fmu_observer.models.filter_models import Known, Measured, Transition
 from plant_models.hybrid import Array, HybridSystem, TracedSystem, vector
+from plant_models.hybrid.casadi_package import ca, demand_casadi
 from plant_models.hybrid.exact_jacobian import is_affine
 from plant_models.hybrid.integration import step
 from plant_models.hybrid.option import is_number, require_whole
@@ -82,6 +82,7 @@ class MovingSystem:
 
     def __post_init__(self) -> None:
         system = self.system
+        demand_casadi()
         if not system.traceable:
             raise ValueError(f"{system.name}: it cannot be traced, so it has no Jacobian and is no model of a filter.")
         if not system.state_count:

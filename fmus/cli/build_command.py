@@ -24,6 +24,7 @@ from fmus.pack import check_target, fmu_path
 from fmus.recipes import RECIPES, SYSTEM, legal_values, recipe
 from fmus.toolchain.targets import choose_targets
 from plant_models import PLANTS
+from plant_models.hybrid.casadi_package import demand_casadi
 from plant_models.user_file import load_class, make, names_a_file, names_code
 
 Version = Literal[2, 3]
@@ -172,6 +173,7 @@ def _names(options: argparse.Namespace) -> list[str]:
         raise ValueError("Give the names of models, see 'fmus list', or --all.")
     if not options.all:
         return list(options.names)
+    demand_casadi()
     return [name for registry in (PLANTS, OBSERVERS) for name, cls in registry.usable().items() if cls.traceable]
 
 

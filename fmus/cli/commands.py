@@ -29,6 +29,7 @@ from fmus.cli.signals import BROKEN_PIPE, forget_output
 from fmus.tables.table import Table, joined, name_column, text_column
 from fmus.tables.terminal import terminal_width
 from fmus.versions import version_text
+from plant_models.missing_package import missing_package
 
 Execute = Callable[[argparse.Namespace], Output]
 """Runs a command with its options."""
@@ -212,6 +213,10 @@ class CommandProgram:
             return BROKEN_PIPE
         except self.expected as error:
             print_error(self.name, self.in_words(error, options))
+        except ModuleNotFoundError as error:  # of an installation without what only some commands need
+            if not (missing := missing_package(error)):
+                raise
+            print_error(self.name, missing)
         except KeyboardInterrupt:
             print_error(self.name, "interrupted.")
         return MISTAKE

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from fmpy.model_description import ModelDescription, ModelVariable
 
@@ -19,6 +18,7 @@ from fmu_observer.description import FIRST_REFERENCE, VariableTable, exposed_inp
 from fmus.content.casadi_source import private_source
 from fmus.content.rolled_loops import rolled_loops
 from plant_models.hybrid import HybridSystem, TracedSystem, scalar_names, traced_once, width
+from plant_models.hybrid.casadi_package import ca, demand_casadi
 from plant_models.hybrid.kernel import check_payloads
 from plant_models.hybrid.requirements import MOST_NAMED, named_values
 
@@ -72,6 +72,7 @@ def trace_equations(system: HybridSystem) -> Equations:
         TracingError: one of its functions cannot be traced, or returns the wrong number of values.
         ValueError: it reads the payload of an event outside that event.
     """
+    demand_casadi()
     if not system.traceable:
         raise GenerationError(
             f"{system.name}: it uses Python that cannot be traced (traceable = False), so no C can be generated from "

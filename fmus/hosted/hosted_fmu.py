@@ -29,6 +29,7 @@ from fmus.hosted.source import HostedExportError, Model, Source, find_source
 from fmus.pack import check_target, fmu_path, pack_fmu
 from fmus.toolchain.compile import compile_library, find_compiler, library_name
 from fmus.toolchain.platforms import Platform, host_platform
+from plant_models.missing_package import installation
 
 __all__ = ["HostedExportError", "build_hosted_fmu"]
 
@@ -109,9 +110,7 @@ def _tried(resources: Mapping[str, bytes], recipe: Mapping[str, Any], slave: str
 
 def _pythonfmu_library(platform: Platform) -> bytes:
     if find_spec("pythonfmu") is None:
-        raise HostedExportError(
-            "Python-hosted export needs the package pythonfmu; run: pip install 'fmu-observer[hosted]'."
-        )
+        raise HostedExportError(f"Python-hosted export needs the package pythonfmu; run: {installation('pythonfmu')}.")
     if platform.name not in LIBRARIES:
         raise HostedExportError(
             f"Python-hosted export is for {', '.join(LIBRARIES)} only; this machine is {platform.name}."

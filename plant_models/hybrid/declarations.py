@@ -17,6 +17,7 @@ from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.noise import FROM_NAME, SEED_LIMIT, Purpose
 from plant_models.hybrid.resource import Resource
 from plant_models.hybrid.signal import Signal, memory, parameter, width
+from plant_models.missing_package import is_installed
 
 Method = Literal["rk4", "rosenbrock", "euler"]
 MISSED = memory(MISSED_SAMPLES, "1", 0.0, "Measurements that were missing at samples")
@@ -48,7 +49,7 @@ class Declarations:
     late_policy: Literal["replay", "reject", "late"] = "replay"
     internal_step: float = 1e-3
     purpose: Purpose = Purpose.NOISE
-    traceable: bool = True
+    traceable: bool = is_installed("casadi")
     option_choices: ClassVar[Mapping[str, Sequence[Any]]] = {}
 
     def __init__(self, **options: Any) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from plant_models.hybrid.arrays import Array
+from plant_models.hybrid.casadi_package import ca
 
 
 def exact_jacobian(
@@ -27,7 +28,7 @@ def exact_jacobian(
     Returns:
         A function of x and u that returns shape (rows, states), for numbers and for traced symbols.
     """
-    ca, x, u, columns = _traced(function, states, inputs)
+    x, u, columns = _traced(function, states, inputs)
     symbolic = ca.ArrayInterface.SX
     traced = ca.Function("jacobian", [x, u], [ca.densify(ca.jacobian(columns, x))])
     shape = (columns.numel(), states)
@@ -46,15 +47,13 @@ def is_affine(function: Callable[[Array, Array], Array], states: int, inputs: in
     Args:
         function: as for `exact_jacobian`. states: number of states. inputs: number of inputs.
     """
-    ca, x, _, columns = _traced(function, states, inputs)
+    x, _, columns = _traced(function, states, inputs)
     return not ca.depends_on(ca.simplify(ca.jacobian(columns, x)), x)
 
 
-def _traced(function: Callable[[Array, Array], Array], states: int, inputs: int) -> tuple[Any, Any, Any, Any]:
-    """CasADi itself, symbols of x and u, and the function of them."""
-    import casadi as ca  # noqa: PLC0415 - for those who differentiate; every observer model imports this file
-
+def _traced(function: Callable[[Array, Array], Array], states: int, inputs: int) -> tuple[Any, Any, Any]:
+    """Symbols of x and u, and the function of them."""
     symbolic = ca.ArrayInterface.SX
     x, u = ca.SX.sym("x", states), ca.SX.sym("u", inputs)
     value = function(symbolic(x, shape=(states,)), symbolic(u, shape=(inputs,)))
-    return ca, x, u, ca.SX(value) if getattr(value, "size", 1) else ca.SX(0, 1)
+    return x, u, ca.SX(value) if getattr(value, "size", 1) else ca.SX(0, 1)

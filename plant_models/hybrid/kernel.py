@@ -11,12 +11,12 @@ from collections.abc import Callable
 from typing import Any, Protocol
 from weakref import WeakKeyDictionary
 
-import casadi as ca
 import numpy as np
 
 from plant_models.disk_cache.entries import remembered
 from plant_models.disk_cache.identity import identity
 from plant_models.hybrid import integration
+from plant_models.hybrid.casadi_package import ca
 from plant_models.hybrid.signal import scalar_names
 from plant_models.hybrid.switching import divided_step
 from plant_models.hybrid.system import HybridSystem

@@ -16,14 +16,13 @@ from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-import casadi as ca
 import numpy as np
 
 from plant_models.hybrid import integration
+from plant_models.hybrid.casadi_package import ca, demand_casadi
 from plant_models.hybrid.system import HybridSystem
 from plant_models.hybrid.tracing_error import TracingError
 
-SYMBOLIC = ca.ArrayInterface.SX
 Expression = TypeVar("Expression")
 FOUNDATION = Path(__file__).parent
 WRITTEN_AS = {
@@ -62,6 +61,7 @@ class TracedSystem:
     """
 
     def __init__(self, system: HybridSystem) -> None:
+        demand_casadi()
         if not system.traceable:
             raise TracingError(f"{system.name}: the system declares that it cannot be traced (traceable = False).")
         self.system = system
@@ -213,8 +213,8 @@ class TracedSystem:
 
     def _arrays(self) -> tuple[Any, Any, Any, Any, Any]:
         s = self._symbols
-        x, u, p = (SYMBOLIC(v, shape=(v.numel(),)) for v in (s.x, s.u, s.p))
-        return SYMBOLIC(s.t, shape=()), SYMBOLIC(s.h, shape=()), x, u, p
+        x, u, p = (ca.ArrayInterface.SX(v, shape=(v.numel(),)) for v in (s.x, s.u, s.p))
+        return ca.ArrayInterface.SX(s.t, shape=()), ca.ArrayInterface.SX(s.h, shape=()), x, u, p
 
     def _trace(self, function: str, *arguments: str) -> ca.SX:
         t, _, x, u, p = self._arrays()
@@ -234,7 +234,9 @@ class TracedSystem:
         def jacobian(_time: Any, _state: Any) -> tuple[Any, Any]:
             by_x, by_t = self._effective_jacobian_expression()
             count = self.system.continuous_count
-            return SYMBOLIC(ca.densify(by_x), shape=(count, count)), SYMBOLIC(ca.densify(by_t), shape=(count,))
+            return ca.ArrayInterface.SX(ca.densify(by_x), shape=(count, count)), ca.ArrayInterface.SX(
+                ca.densify(by_t), shape=(count,)
+            )
 
         return self._guarded("flow", lambda: integration.step(self.system, t, h, x, u, p, jacobian))
 
@@ -243,7 +245,7 @@ class TracedSystem:
         if not self.system.switchings:
             return ca.SX(0.0)
         t, h, x, u, p = self._arrays()
-        after = SYMBOLIC(x_next, shape=(x_next.numel(),))
+        after = ca.ArrayInterface.SX(x_next, shape=(x_next.numel(),))
         switch = self.system.switch_vector
         changed = self._guarded("switching", lambda: np.abs(switch(t + h, after, u, p) - switch(t, x, u, p)))
         return ca.sum1(changed)
@@ -251,8 +253,8 @@ class TracedSystem:
     def _held(self) -> tuple[Any, Any]:
         """Signs and switches as symbols; None where there are none."""
         count, held = len(self.system.frictions), self._symbols.held
-        signs = SYMBOLIC(held[:count], shape=(count,)) if count else None
-        switches = SYMBOLIC(held[count:], shape=(held.numel() - count,)) if self.system.switchings else None
+        signs = ca.ArrayInterface.SX(held[:count], shape=(count,)) if count else None
+        switches = ca.ArrayInterface.SX(held[count:], shape=(held.numel() - count,)) if self.system.switchings else None
         return signs, switches
 
     def _derivative_expression(self) -> ca.SX:

@@ -19,7 +19,7 @@ class Format(ABC):
         name: in scenarios. endings: of file names, the usual one first.
         keeps: whether units, telegrams and summary are in the file, beside the table.
         speed: the larger, the sooner it is read where a folder holds several; CSV has 0.
-        package, extra: which package it needs, and the extra of ours that brings it; None for none.
+        package: which package it needs, if one is; None for none.
     """
 
     name: ClassVar[str]
@@ -27,7 +27,6 @@ class Format(ABC):
     keeps: ClassVar[bool] = True
     speed: ClassVar[int] = -1
     package: ClassVar[str | None] = None
-    extra: ClassVar[str | None] = None
 
     @staticmethod
     @abstractmethod

@@ -122,7 +122,7 @@ class _GuardedFile:
 
 
 def _h5py() -> Any:
-    return optional_module("h5py", "hdf5", "HDF5 files")
+    return optional_module("h5py", "HDF5 files")
 
 
 def _columns(file: Any, rows: int, chunk: int, signals: Sequence[SignalInfo]) -> list[Any]:
@@ -234,7 +234,7 @@ class Hdf5Format(Format):
     name = "hdf5"
     endings = (".h5", ".hdf5")
     speed = 1
-    package, extra = "h5py", "hdf5"
+    package = "h5py"
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cosim.errors import OutputError, nearest
 from cosim.results.formats.format import Format
-from cosim.results.optional import is_installed
+from plant_models.missing_package import installation, is_installed
 from plant_models.registry import Registry, RegistryError
 
 FORMATS: Registry[type[Format]] = Registry(
@@ -51,7 +51,7 @@ def check_formats(names: Iterable[str]) -> None:
         except RegistryError as error:
             raise OutputError(str(error)) from error
         if wanted.package is not None and not is_installed(wanted.package):
-            install = f"pip install 'fmu-observer[{wanted.extra}]'"
+            install = installation(wanted.package)
             raise OutputError(
                 f"The result format {name!r} needs the package {wanted.package}: {install}, or choose another format."
             )

@@ -26,7 +26,7 @@ _ABOUT = b"fmu-observer"
 
 
 def _modules() -> tuple[Any, Any]:
-    arrow, parquet = (optional_module(name, "parquet", "Parquet files") for name in ("pyarrow", "pyarrow.parquet"))
+    arrow, parquet = (optional_module(name, "Parquet files") for name in ("pyarrow", "pyarrow.parquet"))
     return arrow, parquet
 
 
@@ -81,7 +81,7 @@ class ParquetFormat(Format):
     name = "parquet"
     endings = (".parquet", ".pq")
     speed = 2
-    package, extra = "pyarrow", "parquet"
+    package = "pyarrow"
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format

@@ -10,10 +10,10 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from fmu_observer.formulas.moving_horizon.window_stages import BufferedCall
+from plant_models.hybrid.casadi_package import ca
 
 
 class _FreeSweep:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 
 from fmu_observer.formulas.filtering.kalman import symmetric
@@ -16,6 +15,7 @@ from fmu_observer.formulas.filtering.square_root import factor, solved_lower
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost
 from fmu_observer.formulas.moving_horizon.window_problem import WindowProblem
 from plant_models.hybrid import Array
+from plant_models.hybrid.casadi_package import ca
 
 _Numbers = np.ndarray
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fmu_observer.design.optimisers.optimiser import Array, Optimiser
+from plant_models.missing_package import optional_package
 
 
 @dataclass(eq=False, repr=False, kw_only=True)
@@ -36,12 +37,7 @@ class CovarianceMatrixAdaptation(Optimiser):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        try:
-            import cma  # noqa: PLC0415 - an optional extra
-        except ImportError as error:
-            raise ImportError(
-                "The optimiser cma_es needs the package cma: pip install 'fmu-observer[tuning]'."
-            ) from error
+        cma = optional_package("cma", "The optimiser cma_es")
         first = 0.5 * (self.lower + self.upper) if self.start is None else np.asarray(self.start, float)
         settings: dict[str, Any] = {
             "bounds": [0.0, 1.0],
