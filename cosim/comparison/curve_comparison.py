@@ -203,7 +203,6 @@ def compare_signal(task: Task) -> SignalComparison:
         task.tolerance,
         allowed.value,
         allowed.time,
-        allowed.scale,
         max_error=float(np.max(size)) if len(size) else float("nan"),
         max_error_at=float("nan") if at is None else float(points.time[at]),
         max_shift=float(np.max(np.abs(jumps.shift), initial=0.0)),
@@ -212,6 +211,7 @@ def compare_signal(task: Task) -> SignalComparison:
         worst=_worst(points, findings, at),
         findings=findings,
         curves=_curves(task, points, jumps, allowed) if task.curves else None,
+        scale=allowed.scale,
     )
 
 
@@ -245,11 +245,11 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
         task.tolerance,
         allowed.value,
         allowed.time,
-        allowed.scale,
         max_error=0.0 if numbers else float("nan"),
         max_error_at=float(reference.time[0]),
         rms_error=0.0 if numbers else float("nan"),
         curves=curves,
+        scale=allowed.scale,
     )
 
 

@@ -88,7 +88,6 @@ class SignalComparison:
     Args:
         name: of the signal. unit: SI unit of the reference. status: see `Status`.
         tolerance: in use. allowed: difference in value allowed [unit]. allowed_time: in time [s].
-        scale: range of the reference, of which a relative tolerance is a share [unit].
         max_error: largest difference in value beyond what the allowed time explains [unit]; NaN where nothing was
             compared.
         max_error_at: when [s].
@@ -98,8 +97,9 @@ class SignalComparison:
         worst: the worst points, largest excess first, a few: (time [s], reference, result, error).
         findings: everything beyond tolerance, worst first.
         nearest: for a missing signal, names in the result that look like it.
-        same_values: for a missing signal, the name of one that only the result has, with its values.
         curves: for pictures; None where there is nothing to draw.
+        same_values: for a missing signal, the name of one that only the result has, with its values.
+        scale: range of the reference, of which a relative tolerance is a share [unit].
     """
 
     name: str
@@ -108,7 +108,6 @@ class SignalComparison:
     tolerance: Tolerance
     allowed: float = float("nan")
     allowed_time: float = float("nan")
-    scale: float = float("nan")
     max_error: float = float("nan")
     max_error_at: float = float("nan")
     max_shift: float = 0.0
@@ -117,8 +116,9 @@ class SignalComparison:
     worst: Sequence[tuple[float, float, float, float]] = ()
     findings: Sequence[ComparisonFinding] = ()
     nearest: Sequence[str] = ()
-    same_values: str = ""
     curves: Curves | None = None
+    same_values: str = ""
+    scale: float = float("nan")
 
     @property
     def share_of_range(self) -> float:
