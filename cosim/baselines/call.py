@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +108,25 @@ class Call:
         failure = self.subject.result.failure
         if failure is not None and not self.path.exists():
             raise BaselineError(f"The run failed, and there is no baseline {self.path} yet: {failure}")
+
+    @staticmethod
+    def headlines(found: Comparison) -> dict[str, str]:
+        """What was found in three lines: what was different in what was run, what is common, the worst signal.
+
+        Args:
+            found: what was found.
+
+        Returns:
+            Lines by ``changed``, ``common`` and ``worst``, as far as there is such a thing.
+        """
+        worst = found.failed[0] if found.failed else None
+        share = "" if worst is None or not isfinite(worst.share_of_range) else f" {100.0 * worst.share_of_range:.3g} %"
+        lines = {
+            "changed": "; ".join(found.causes),
+            "common": "; ".join(change.text for change in common_changes(found)),
+            "worst": "" if worst is None else f"{worst.name}{share and share + ' of its range'}",
+        }
+        return {key: line for key, line in lines.items() if line}
 
     @staticmethod
     def worst(found: Comparison) -> list[str]:

@@ -73,7 +73,8 @@ def comparison_parts(comparison: ComparisonData, verbose: bool = False) -> Parts
     others = [f"note: {note}" for note in comparison.notes if note not in comparison.causes]
     most_notes = _ALL if verbose else _NOTES_OF_EQUAL if comparison.equal else _NOTES
     notes = "\n".join(_first(others, most_notes, "notes"))
-    above = [*head, "\n".join(f"  {line}" for line in _first(common, _ALL if verbose else _CHANGES, "changes")), table]
+    changes = "\n".join(f"  {line}" for line in _first(common, _ALL if verbose else _CHANGES, "changes"))
+    above: list[Table | str] = [*head, changes, table]
     room = _ALL if verbose else MOST_LINES - len(joined([*above, notes]).splitlines()) - 2
     return [*above, *_symptoms(comparison, shown, shared, verbose, room), notes]
 
@@ -112,7 +113,7 @@ def _symptoms(
     events = ["\n".join(text.splitlines()) for text in _events(comparison, max(2, room // 2))]
     left = room - sum(len(text.splitlines()) + 1 for text in events)
     findings = "\n".join(_first(lines, max(2, left), "lines: see --verbose"))
-    points = next(filter(None, (_points(signal, shared) for signal in shown)), "")
+    points: Table | str = next((found for signal in shown if (found := _points(signal, shared))), "")
     needed = len(joined([findings, points]).splitlines()) + 1
     return [findings, *([points] if needed <= left else []), *events]
 

@@ -4,14 +4,13 @@ pytest.
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from cosim.errors import CosimError
-from cosim.pytest_plugin import options
-from cosim.pytest_plugin.records import Records, RegressionRecord
+from cosim.pytest_plugin import index_page, options, services
+from cosim.pytest_plugin.records import Records, RegressionRecord, verdict
 
 TITLE = "fmu baselines"
 LINES = 6
@@ -19,15 +18,6 @@ LINES = 6
 _WRITTEN: pytest.StashKey[list[str]] = pytest.StashKey()
 REFUSED: pytest.StashKey[str] = pytest.StashKey()
 """Why nothing was written, or an empty text."""
-WORDS = {
-    "equal": "as before",
-    "differs": "differ",
-    "missing": "without a baseline",
-    "error": "could not be checked",
-    "new": "new",
-    "changed": "changed",
-    "unchanged": "unchanged",
-}
 
 
 def write_baselines(session: pytest.Session, exitstatus: int) -> None:
@@ -68,17 +58,18 @@ def report(terminal: pytest.TerminalReporter, config: pytest.Config) -> None:
     if not records:
         return
     terminal.section(TITLE)
-    counts = Counter(record.status for record in records)
-    terminal.write_line(f"{len(records)} checked: " + ", ".join(f"{n} {WORDS[s]}" for s, n in sorted(counts.items())))
+    terminal.write_line(verdict(records))
     for record in records:
         if record.status not in ("equal", "unchanged"):
             _write_record(terminal, record, config)
     if options.mode(config) == "update":
         _write_update(terminal, records, config)
+    for line in [*services.leave(records), *index_page.written(records, config)]:
+        terminal.write_line(line)
 
 
 def _write_record(terminal: pytest.TerminalReporter, record: RegressionRecord, config: pytest.Config) -> None:
-    terminal.write_line(f"{record.test}: {_shown(Path(record.baseline), config)} {_verb(record)}")
+    terminal.write_line(f"{record.test}: {options.shown(Path(record.baseline), config)} {_verb(record)}")
     for line in record.lines[:LINES]:
         terminal.write_line(f"    {line}")
     if len(record.lines) > LINES:
@@ -106,7 +97,7 @@ def _write_update(terminal: pytest.TerminalReporter, records: list[RegressionRec
     elif staged:
         terminal.write_line(f"{len(staged)} written.")
     if unused := _unused(records, config):
-        terminal.write_line("Not used by this run: " + ", ".join(_shown(path, config) for path in unused))
+        terminal.write_line("Not used by this run: " + ", ".join(options.shown(path, config) for path in unused))
 
 
 def _unused(records: list[RegressionRecord], config: pytest.Config) -> list[Path]:
@@ -119,7 +110,3 @@ def _unused(records: list[RegressionRecord], config: pytest.Config) -> list[Path
         return []
     used = {Path(record.baseline) for record in records}
     return sorted({path for folder in {path.parent for path in used} for path in folder.glob("*.json")} - used)
-
-
-def _shown(path: Path, config: pytest.Config) -> str:
-    return str(path.relative_to(config.rootpath)) if path.is_relative_to(config.rootpath) else str(path)

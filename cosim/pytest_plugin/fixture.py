@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 import re
 from hashlib import sha256
 
-from plant_models.missing_package import missing_package
+from plant_models.missing_package import is_installed, missing_package
 
 UPDATE = "If the new outputs are right, accept them with: pytest --fmu-baseline=update"
 
@@ -145,12 +145,12 @@ class FmuRegression:
             return call.without_baseline()
         found = call.check()
         if found.equal:
-            self._keep(call.path, "equal", list(found.notes))
+            self._keep(call.path, "equal", list(found.notes), headlines=call.headlines(found))
             # of an earlier run: it would not speak of this one
             shutil.rmtree(self._artifacts(call.path), ignore_errors=True)
             return found
         files = self._draw(found, call.path)
-        self._keep(call.path, "differs", call.worst(found), files)
+        self._keep(call.path, "differs", call.worst(found), files, headlines=call.headlines(found))
         if not tolerant:
             pytest.fail(self._explanation(call, found, files), pytrace=False)
         return found
@@ -171,7 +171,7 @@ class FmuRegression:
     def _explanation(self, call: Call, found: Regression, files: Mapping[str, str]) -> str:
         from cosim.comparison.comparison_text import comparison_text  # noqa: PLC0415 - only for what differs
 
-        files = {"baseline": self._shown(call.path), **files}
+        files = {"baseline": options.shown(call.path, self._config), **files}
         where = [f"{kind:>8}: {path}" for kind, path in files.items()]
         return "\n".join([comparison_text(found).rstrip(), "", *where, UPDATE])
 
@@ -184,7 +184,9 @@ class FmuRegression:
             root = options.artifacts_folder(self._config)
             root.mkdir(parents=True, exist_ok=True)
             (root / ".gitignore").write_text("*\n", encoding="utf-8")
-            return {kind: self._shown(file) for kind, file in write_comparison(found, folder, pictures=True).items()}
+            drawn = is_installed("matplotlib")  # the page shows the same, to be explored
+            files = write_comparison(found, folder, pictures=drawn)
+            return {kind: options.shown(file, self._config) for kind, file in files.items()}
         except Exception as error:  # the difference must be reported, whatever happens to its picture
             return {"picture": f"could not be made: {missing_package(error) or error}"}
 
@@ -198,11 +200,11 @@ class FmuRegression:
         lines: Sequence[str] = (),
         files: Mapping[str, str] | None = None,
         staged: str = "",
+        headlines: Mapping[str, str] | None = None,
     ) -> None:
-        record = RegressionRecord(self._node.nodeid, str(path), status, list(lines), dict(files or {}), staged)
+        """Keep what was found for the end of the session, and as properties of the test for a JUnit file."""
+        place = str(self._file), self._node.location[1] + 1
+        kept = list(lines), dict(files or {}), staged, dict(headlines or {})
+        record = RegressionRecord(self._node.nodeid, str(path), status, *kept, *place)
         Records.of(self._config).add(record)
-
-    def _shown(self, path: Path) -> str:
-        """A path as people see it: from the root, where it is inside."""
-        root = self._config.rootpath
-        return str(path.relative_to(root)) if path.is_relative_to(root) else str(path)
+        self._node.user_properties.extend(record.properties())

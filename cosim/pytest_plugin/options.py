@@ -77,3 +77,12 @@ def artifacts_folder(config: pytest.Config) -> Path:
         config: of the session.
     """
     return config.rootpath / str(config.getoption("--fmu-artifacts") or config.getini("fmu_artifacts"))
+
+
+def shown(path: Path, config: pytest.Config) -> str:
+    """A path as people see it: from the root, where it is inside.
+
+    Args:
+        path: of a file. config: of the session.
+    """
+    return str(path.relative_to(config.rootpath)) if path.is_relative_to(config.rootpath) else str(path)

@@ -9,6 +9,8 @@ from __future__ import annotations
 import json
 import shutil
 import tempfile
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -17,6 +19,18 @@ from uuid import uuid4
 import pytest
 
 Status = Literal["equal", "differs", "missing", "error", "new", "changed", "unchanged"]
+AS_BEFORE = ("equal", "new", "changed", "unchanged")
+"""Outcomes after which nothing is to be done."""
+HEADLINES = ("changed", "common", "worst")
+WORDS = {
+    "equal": "as before",
+    "differs": "differ",
+    "missing": "without a baseline",
+    "error": "could not be checked",
+    "new": "new",
+    "changed": "changed",
+    "unchanged": "unchanged",
+}
 
 
 @dataclass(frozen=True)
@@ -26,6 +40,8 @@ class RegressionRecord:
     Args:
         test: node of the test. baseline: path of its JSON file. status: what became of it.
         lines: worst points, notes. files: pages and pictures by kind. staged: folder with the files to be written.
+        headlines: what services show of it, by name: ``changed``, ``common``, ``worst``, where there is such a thing.
+        file, line: where the test stands.
     """
 
     test: str
@@ -34,6 +50,24 @@ class RegressionRecord:
     lines: list[str] = field(default_factory=list)
     files: dict[str, str] = field(default_factory=dict)
     staged: str = ""
+    headlines: dict[str, str] = field(default_factory=dict)
+    file: str = ""
+    line: int = 1
+
+    def properties(self) -> list[tuple[str, str]]:
+        """Names and values for a JUnit file."""
+        shown = {"baseline": Path(self.baseline).name, "status": self.status, **self.headlines, **self.files}
+        return [(f"fmu_{name}", value) for name, value in shown.items()]
+
+
+def verdict(records: Sequence[RegressionRecord]) -> str:
+    """How many were checked, and what became of them.
+
+    Args:
+        records: of the session.
+    """
+    counts = Counter(record.status for record in records)
+    return f"{len(records)} checked: " + ", ".join(f"{n} {WORDS[s]}" for s, n in sorted(counts.items()))
 
 
 class Records:

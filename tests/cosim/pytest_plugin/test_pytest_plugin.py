@@ -11,6 +11,7 @@ from pathlib import Path
 
 import failing_models
 import pytest
+from plugin_sessions import MADE, ONE, run, write
 
 import cosim.baselines.call
 import cosim.comparison.comparison_text
@@ -40,29 +41,6 @@ def _loaded(tmp_path_factory: pytest.TempPathFactory) -> None:
     path.write_text(SCENARIO, encoding="utf-8")
     call = cosim.baselines.call.Call.run("run.toml", path.parent, path.with_name("base.json"))
     cosim.report.page.comparison.write_comparison(call.update().after, path.parent / "drawn")
-
-
-MADE = """
-import numpy as np
-import pytest
-from cosim.results.result import Result, SignalInfo
-
-def line(slope=1.0, names=("train.speed", "train.position")):
-    table = np.zeros(11, [("time", float), *((name, float) for name in names)])
-    for name in table.dtype.names:
-        table[name] = 0.1 * np.arange(11) * (1.0 if name == "time" else slope)
-    return Result(table, [SignalInfo(name, "m/s") for name in names])
-"""
-ONE = MADE + "def test_line(fmu_regression):\n    fmu_regression(line(SLOPE))\n"
-"""A test of a result made by hand: the plugin's ways without the cost of a run."""
-
-
-def write(pytester: pytest.Pytester, text: str, slope: float = 1.0, name: str = "test_train") -> None:
-    pytester.makepyfile(**{name: text.replace("SLOPE", repr(slope))})
-
-
-def run(pytester: pytest.Pytester, *options: str) -> pytest.RunResult:
-    return pytester.runpytest_inprocess("-p", "no:cacheprovider", *options)
 
 
 def tree(pytester: pytest.Pytester) -> dict[str, bytes]:
