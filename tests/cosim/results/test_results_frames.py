@@ -91,7 +91,7 @@ def test_frame_of_somebody_else() -> None:
 
 def test_package_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(OutputError, match=r"package pandas .*pip install 'fmu-observer\[frames\]'"):
+    with pytest.raises(OutputError, match=r"package pandas .*pip install 'pandas>="):
         odd_result().to_pandas()
 
 
