@@ -32,7 +32,7 @@ from cosim.scenario.model_name import ModelName
 from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 
 DOCS = Path(__file__).parent
-sys.path.insert(0, str(DOCS / "gallery"))
+sys.path.append(str(DOCS / "gallery"))
 
 import figure_index  # noqa: E402 - stands in a folder of scripts
 import small_picture  # noqa: E402

@@ -25,7 +25,7 @@ from plant_models import Locomotive
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "images" / "guide"
 FILE = re.compile(r"^```toml\n# (?P<name>[\w.]+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
-sys.path.insert(0, str(DOCS / "gallery"))
+sys.path.append(str(DOCS / "gallery"))
 
 import small_picture  # noqa: E402 - stands in a folder of scripts
 

@@ -13,7 +13,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))  # for those who load this file by its path
+sys.path.append(str(Path(__file__).parent))  # for those who load this file by its path
 from line import table
 
 HERE = Path(__file__).parent
