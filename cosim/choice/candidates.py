@@ -174,5 +174,5 @@ def with_candidate(scenario: Scenario, candidate: BenchmarkCandidate) -> Scenari
     if candidate.name not in changed.table().components:
         changed.add(candidate.name, **candidate.table.model_dump(by_alias=True, exclude_unset=True))
         lines = [connection(link, f"{candidate.name}.{signal}") for signal, link in candidate.sources.items()]
-        changed.connect(*lines)  # type: ignore[arg-type] # tables as well as texts
+        changed.connect(*lines)
     return changed.report(observers=[candidate.name])
