@@ -41,7 +41,7 @@ _SIGNALS = (
 _ROUNDING = 1e-6  # of what a signal varies: residuals below it are no noise
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Calibration(Readable):
     """Calibrated parameters.
 

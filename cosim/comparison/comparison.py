@@ -9,7 +9,7 @@ from cosim.comparison.verdict import ComparisonData
 from fmus.tables.table import Parts, Readable
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Comparison(ComparisonData, Readable):
     """What a comparison found; see `cosim.comparison.verdict.ComparisonData`."""
 

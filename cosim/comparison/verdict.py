@@ -171,7 +171,7 @@ class EventComparison:
     compared: bool = True
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class ComparisonData:
     """The comparison of a result with a reference.
 

@@ -28,7 +28,7 @@ _RANK_TOLERANCE = 1e-7
 """For modes that are not seen or not reached, relative: differences lose half of the digits."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False)
 class Linearisation(Readable):
     """``d dx = A dx + B du``, ``dy = C dx + D du`` about a point, or the same from one step to the next.
 

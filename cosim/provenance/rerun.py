@@ -78,7 +78,7 @@ def _bits(value: object) -> object:
     return float(value).hex() if isinstance(value, float) else dict(value) if isinstance(value, dict) else value
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Rerun(Readable):
     """What came out of running results again.
 

@@ -14,7 +14,7 @@ from cosim.results.to_frames import events_to_pandas, to_pandas, to_xarray
 __all__ = ["BaliseRecord", "PacketRecord", "Result", "SignalInfo"]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Result(ResultData):
     """Everything a run leaves behind; see `cosim.results.result_data.ResultData`."""
 

@@ -102,7 +102,7 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class ResultData(FirstScreen, Mapping[str, np.ndarray]):
     """Everything a run leaves behind, as the readers of files return it; a mapping from the names of the columns,
     ``time`` first, to their values.

@@ -35,7 +35,7 @@ INTERRUPTED = "The run was interrupted; what was computed so far is kept."
 """The failure of a run that somebody stopped."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Outcome(FirstScreen, Mapping[str, np.ndarray]):
     """What a run leaves; a mapping from the names of the recorded signals, ``time`` first, to their values.
 

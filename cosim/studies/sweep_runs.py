@@ -51,7 +51,7 @@ class SweepRun:
         return None if self.folder is None else load_result(self.folder)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class SweepRuns(FirstScreen):
     """The runs of a sweep, in order of its variations.
 

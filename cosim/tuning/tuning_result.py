@@ -46,7 +46,7 @@ class Searched:
     evaluations: Sequence[int]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Tuning(Readable):
     """What came out.
 

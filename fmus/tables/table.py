@@ -85,6 +85,10 @@ def error_column(key: str, heading: str, unit: str, meaning: str = "", **more: A
 class FirstScreen:
     """What shows itself on one screen, in a terminal (``repr``) and in a notebook: a sentence, then tables."""
 
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        cls.__repr__ = FirstScreen.__repr__  # type: ignore[method-assign] # where it stands no dataclass writes its own
+
     def first_screen(self) -> Parts:
         """What is shown, the most important first."""
         raise NotImplementedError
@@ -105,7 +109,7 @@ SCREEN_WIDTH, SCREEN_LINES, SCREEN_ROWS = 100, 40, 16
 """Columns and lines of a screen, and rows of a table on it."""
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
 class Table(FirstScreen):
     """A table.
 
