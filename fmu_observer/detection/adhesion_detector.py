@@ -79,8 +79,10 @@ class AdhesionDetector(HybridSystem):
     outputs = (
         discrete_output("condition", "1", "1 nominal, 2 degraded adhesion, debounced"),
         output_signal("raw_condition", "1", "The verdict on the filtered slip now"),
-        output_signal("nominal_optimum", "1", "Optimal slip on nominal adhesion at this speed"),
-        output_signal("degraded_optimum", "1", "Optimal slip on degraded adhesion at this speed"),
+        *(
+            output_signal(f"{level}_optimum", "1", f"Optimal slip on {level} adhesion at this speed")
+            for level in ("nominal", "degraded")
+        ),
         output_signal("adhesion_limit", "1", "Largest adhesion coefficient at this speed in the condition judged"),
     )
     events = (PeriodicEvent("check", "check_period", description="The filtered slip is judged"),)

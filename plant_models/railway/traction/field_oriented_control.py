@@ -43,18 +43,13 @@ class FieldOrientedControl(HybridSystem):
     bounded_parameters = "all"
     states = (
         memory("speed_integral", "A", 0.0, "Integral of the speed control"),
-        memory("integral_d", "V", 0.0, "Integral of the current control along d"),
-        memory("integral_q", "V", 0.0, "Integral of the current control along q"),
-        memory("held_voltage_d", "V", 0.0, "Voltage of this period along d"),
-        memory("held_voltage_q", "V", 0.0, "Voltage of this period along q"),
+        *(memory(f"integral_{axis}", "V", 0.0, f"Integral of the current control along {axis}") for axis in "dq"),
+        *(memory(f"held_voltage_{axis}", "V", 0.0, f"Voltage of this period along {axis}") for axis in "dq"),
         memory("held_angle", "rad", 0.0, "Electrical angle at the control instant"),
         memory("held_reference", "A", 0.0, "Current asked for along q"),
     )
     outputs = (
-        discrete_output("voltage_d", "V", "Voltage along d"),
-        discrete_output("voltage_q", "V", "Voltage along q"),
-        discrete_output("voltage_alpha", "V", "Voltage along alpha"),
-        discrete_output("voltage_beta", "V", "Voltage along beta"),
+        *(discrete_output(f"voltage_{axis}", "V", f"Voltage along {axis}") for axis in ("d", "q", "alpha", "beta")),
         discrete_output("current_reference", "A", "Current asked for along q"),
     )
     parameters = (

@@ -28,14 +28,15 @@ class Inverter(HybridSystem):
     internal_step = 1e-2  # nothing flows
     bounded_parameters = "all"
     inputs = (
-        input_signal("wanted_voltage_alpha", "V", 0.0, "Voltage asked for along alpha"),
-        input_signal("wanted_voltage_beta", "V", 0.0, "Voltage asked for along beta"),
+        *(
+            input_signal(f"wanted_voltage_{axis}", "V", 0.0, f"Voltage asked for along {axis}")
+            for axis in ("alpha", "beta")
+        ),
         input_signal("current_alpha", "A", 0.0, "Current along alpha, for the direct current", optional=True),
         input_signal("current_beta", "A", 0.0, "Current along beta, for the direct current", optional=True),
     )
     outputs = (
-        output_signal("voltage_alpha", "V", "Voltage along alpha"),
-        output_signal("voltage_beta", "V", "Voltage along beta"),
+        *(output_signal(f"voltage_{axis}", "V", f"Voltage along {axis}") for axis in ("alpha", "beta")),
         *(output_signal(f"duty_{phase}", "1", f"Duty cycle of phase {phase}") for phase in "abc"),
         output_signal("direct_current", "A", "Current taken from the direct voltage"),
     )

@@ -61,6 +61,7 @@ _PRINTED_MEMORY: tuple[Signal, ...] = (
 
 Reading = Literal["repaired", "as_published"]
 LONG, SHORT = 100, 50  # orders of the properties that ship
+_NOMINAL = {"length": 0.3345, "short_tip": 0.052, "gap": 0.0021}
 
 
 class SignatureTrack(HybridSystem):
@@ -109,17 +110,19 @@ class SignatureTrack(HybridSystem):
             "Filter the signal, or widen the changes that count",
             ("noise",),
         ),
-        output_signal("p1_changed", "1", "1 while the first parameter is judged to have changed"),
-        output_signal("p2_changed", "1", "1 while the second parameter is judged to have changed"),
-        output_signal("p3_changed", "1", "1 while the third parameter is judged to have changed"),
+        *(
+            output_signal(f"p{number}_changed", "1", f"1 while the {which} parameter is judged to have changed")
+            for number, which in enumerate(("first", "second", "third"), start=1)
+        ),
     )
     parameters = (
         parameter("sample_period", "s", 0.01, "Time between two samples, tau", min=1e-6),
         parameter("eps", "1", 1e-3, "Regularisation in the unit of the signal", min=1e-12),
         parameter("patience", "s", 3.0, "Time without a tip after which the properties no longer count", min=0.0),
-        parameter("nominal_length", "1", 0.3345, "r1 without a change"),
-        parameter("nominal_short_tip", "1", 0.052, "r2 without a change"),
-        parameter("nominal_gap", "1", 0.0021, "r3 without a change"),
+        *(
+            parameter(f"nominal_{name}", "1", value, f"r{number} without a change")
+            for number, (name, value) in enumerate(_NOMINAL.items(), start=1)
+        ),
         parameter("length_change", "1", 0.01, "Change of r1 that counts", min=0.0),
         parameter("strong_change", "1", 0.02, "Change of r1 that counts although r2 has changed", min=0.0),
         parameter("short_tip_change", "1", 0.002, "Change of r2 that counts", min=0.0),
