@@ -17,6 +17,7 @@ from cosim import shipped_scenarios
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LIKE_AN_IMPORT = re.compile(r"^\s*(?:from|import) (\w+)", re.MULTILINE)  # or like a sentence
+IMPORTED_BY_NAME = re.compile(r"(?:optional_package|LazyPackage)\(\s*\"(\w+)")  # what an installation may be without
 PACKAGE_NAME = re.compile(r"^[A-Za-z0-9-]+")
 
 
@@ -79,6 +80,7 @@ def imported_packages() -> frozenset[str]:
     names: set[str] = set()
     for path in (p for package in PACKAGES for p in (ROOT / package).rglob("*.py")):
         text = path.read_text(encoding="utf-8")
+        names.update(IMPORTED_BY_NAME.findall(text))
         if names.issuperset(LIKE_AN_IMPORT.findall(text)):
             continue
         for node in ast.walk(ast.parse(text)):
