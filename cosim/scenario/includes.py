@@ -127,6 +127,8 @@ def _read(path: Path, chain: Sequence[Path]) -> dict[str, Any]:
     except OSError as error:
         raise ScenarioError(f"Scenario file {path} cannot be read: {error.strerror}{by}.") from error
     except ValueError as error:
+        if path.suffix.lower() in (".py", ".csv", ".ipynb"):
+            raise ScenarioError(f"{path} is no scenario, whose file ends in .toml or .ssp{by}.") from error
         raise ScenarioError(f"{path}: not readable as TOML: {error}{by}") from error
 
 

@@ -21,6 +21,7 @@ from cosim.errors import ScenarioError, nearest
 from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
 from fmus.fmi.archive import MAX_UNPACKED_BYTES, NotAnFmuError, demand_harmless
+from fmus.near_files import missing_file
 
 DEFAULT_VARIANT = "SystemStructure.ssd"
 _MAX_XML_BYTES = 64 * 1024**2
@@ -57,8 +58,9 @@ class Package:
         self.path, self.title, self.unpacked, self.lapses = path, title, unpacked, lapses
         self._files: dict[str, Path] = {}
         if not path.is_file():
-            what = "is a folder, expected an .ssp file" if path.is_dir() else "does not exist"
-            raise ScenarioError(f"{title} {what}.")
+            raise ScenarioError(
+                f"{title} is a folder, expected an .ssp file." if path.is_dir() else missing_file(path, ".ssp")
+            )
         try:
             with zipfile.ZipFile(path) as archive:
                 entries = archive.infolist()

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import ast
 import shlex
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -23,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.cli.completion import completion_script
-from fmus.cli.output import Output
+from fmus.cli.output import Output, UnwritableError
 from fmus.cli.parsers import MISTAKE, Parser, print_error
 from fmus.cli.signals import BROKEN_PIPE, forget_output
 from fmus.tables.table import Table, joined, name_column, text_column
@@ -205,12 +204,13 @@ class CommandProgram:
             self.parser(words).parse_args(words, options)
             with self.within():
                 output: Output = options.execute(options)
-                code = output.show(self.name, as_json=options.json)
-            sys.stdout.flush()
-            return code
+                return output.show(self.name, as_json=options.json)
         except BrokenPipeError:  # whoever read has seen enough, as `head` does
             forget_output()
             return BROKEN_PIPE
+        except UnwritableError as error:
+            forget_output()
+            print_error(self.name, str(error))
         except self.expected as error:
             print_error(self.name, self.in_words(error, options))
         except ModuleNotFoundError as error:  # of an installation without what only some commands need

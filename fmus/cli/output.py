@@ -70,9 +70,27 @@ class Output:
             end = plain(joined([self.verdict], terminal_width()))
             text = text.removesuffix(end) + coloured(end, self.role)
         if text:
-            print(text)
+            _print(text)
         for failure in self.failures:
             print_error(program, failure)
         if self.error is not None:
             raise self.error
         return self.code
+
+
+class UnwritableError(OSError):
+    """Standard output takes no more: it is a file on a full disk, say."""
+
+
+def _print(text: str) -> None:
+    """Print to standard output, at once.
+
+    Raises:
+        BrokenPipeError: nobody reads any more. UnwritableError: it cannot be written for another reason.
+    """
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise UnwritableError(f"standard output cannot be written: {error.strerror or error}.") from error

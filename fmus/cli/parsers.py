@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -14,6 +15,10 @@ from fmus.plain import plain
 
 MISTAKE = 2
 """Exit code of a mistake on the command line."""
+
+
+_VALUES = {"int": "a whole number", "float": "a number, such as 0.1"}
+"""What is expected, by the name that argparse has for it."""
 
 
 class Help(argparse.HelpFormatter):
@@ -52,6 +57,8 @@ class Parser(argparse.ArgumentParser):
         Raises:
             SystemExit: in any case.
         """
+        for kind, expected in _VALUES.items():
+            message = re.sub(rf"invalid {kind} value: (.*)", rf"expected {expected} (got \1)", message)
         print_error(self.prog, f"{message} (see '{self.prog} --help')")
         raise SystemExit(MISTAKE)
 

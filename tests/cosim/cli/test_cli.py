@@ -240,6 +240,15 @@ def test_a_reader_that_leaves_is_no_reason_for_a_traceback() -> None:
     assert (process.returncode, reported) == (141, "")
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_standard_output_on_a_full_disk_is_no_reason_for_a_traceback() -> None:
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        command = [sys.executable, "-m", "cosim.cli", "list"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "cosim: standard output cannot be written: No space left on device.\n"
+
+
 def test_a_usage_error_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
     for stated, message in (("0", "at least 1"), ("many", "expected a whole number (got 'many')")):
         with pytest.raises(SystemExit) as error:

@@ -161,6 +161,9 @@ COMMANDS = {
     "run folder": "folder is no results folder",
     "run empty.toml": "empty.toml holds no scenario; expected stop = 60.0, step = 0.01, and a table [components.NAME]",
     "run data.json": "it is JSON; a scenario is TOML",
+    "run script.py": "script.py is no scenario, whose file ends in .toml or .ssp.",
+    "run own.toml --workers two": "argument --workers: expected a whole number (got 'two')",
+    "show own.ssp": "own.ssp does not exist; that folder has no .ssp.",
     "run own.toml --out own.toml": "Results cannot be written to",
     "run own.toml --out /proc/none": "Results cannot be written to /proc/none",
     "run own.toml --set step=0,01": "step: expected a number; write a point in place of the comma: 0.01",
@@ -187,6 +190,7 @@ def test_a_mistake_in_a_command_is_one_line(line: str, in_folder: Path, capsys: 
     (in_folder / "own.toml").write_text(GOOD, encoding="utf-8")
     (in_folder / "empty.toml").write_text("\n", encoding="utf-8")
     (in_folder / "data.json").write_text(json.dumps({"stop": 1.0}), encoding="utf-8")
+    (in_folder / "script.py").write_text("print(1)\n", encoding="utf-8")
     (in_folder / "folder").mkdir()
     assert COMMANDS[line] in answer(capsys, *line.split())
 
