@@ -19,7 +19,7 @@ from cosim.run.task import RunTask
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.shipped import shipped_scenarios
 from cosim.scenario.toml_file import read_toml
-from fmus.cli.commands import argument
+from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
 
 CERTIFIED, _NOT_CERTIFIED = 0, 1
@@ -50,9 +50,7 @@ ARGUMENTS = (
     settings_argument(
         "a parameter, for instance --set theta=5 or --set 'gain=[3.4, -3.4, -1.5]'; of a scenario any key"
     ),
-    argument(
-        "--option", action="append", default=[], metavar="NAME=VALUE", help="an option, for instance --option nodes=2"
-    ),
+    repeated("--option", "NAME=VALUE", "an option, for instance --option nodes=2"),
     argument("--gap", type=float, metavar="S", help="certify any mixture of gaps up to this [s]"),
     argument("--period", type=float, metavar="S", help="certify this constant gap [s]"),
     argument("--delay", type=float, metavar="S", help="certify samples that arrive this late [s]"),

@@ -15,7 +15,7 @@ from cosim.report.overlay.overlaid_runs import make_runs
 from cosim.report.page.overlay import write_overlay_page
 from cosim.report.page.run_page import write_report, write_report_page
 from cosim.results.load_result import load_result
-from fmus.cli.commands import argument
+from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
 
 if TYPE_CHECKING:
@@ -43,13 +43,7 @@ ARGUMENTS = (
     argument("results", nargs="+", metavar="DIR", help="results folders, or tables in any format that can be read"),
     argument("--out", metavar="FILE.html", help=f"the page (default: report.html in DIR, or {OVERLAY} for several)"),
     argument("--labels", metavar="A,B", help="texts for the runs, separated by commas (default: names of the folders)"),
-    argument(
-        "--signals",
-        action="append",
-        default=[],
-        metavar="PATTERN",
-        help="for several runs: recorded signals to draw as well, e.g. 'train.*'; may be repeated",
-    ),
+    repeated("--signals", "PATTERN", "for several runs: recorded signals to draw as well, e.g. 'train.*'"),
     argument("--figures", action="store_true", help="draw the figures as PNG files, too, in figures beside the page"),
 )
 

@@ -14,7 +14,7 @@ from typing import Any
 from cosim.comparison.tolerance import KEYS, Tolerance, Tolerances, tolerance
 from cosim.errors import ComparisonError, nearest
 from cosim.scenario.toml_file import read_toml
-from fmus.cli.commands import argument
+from fmus.cli.commands import argument, repeated
 
 Asked = tuple[dict[str, Any], dict[str, Any], list[str]]
 """Keys of the default tolerance, tolerances by signal or pattern, and what to ignore."""
@@ -27,17 +27,13 @@ TOLERANCES = (
     argument("--atol", type=float, metavar="SIZE", help="in value, in the SI unit of each signal"),
     argument("--ttol", type=float, metavar="SECONDS", help="in time [s]"),
     argument("--tolerances", metavar="FILE", help="tolerances by signal, a TOML file (end of 'cosim compare --help')"),
-    argument(
+    repeated(
         "--set-tolerance",
-        action="append",
-        default=[],
-        metavar="SIGNAL=VALUE",
+        "SIGNAL=VALUE",
+        f"of one signal or pattern: {_BY_SIGNAL_EXAMPLE}",
         dest="tolerance_settings",
-        help=f"of one signal or pattern: {_BY_SIGNAL_EXAMPLE}; may be repeated",
     ),
-    argument(
-        "--ignore", action="append", default=[], metavar="PATTERN", help="signals not to compare; may be repeated"
-    ),
+    repeated("--ignore", "PATTERN", "signals not to compare"),
 )
 """Arguments of tolerances."""
 

@@ -13,7 +13,7 @@ from cosim.simulation.scenario import Scenario
 from cosim.tuning.parameters import Bounds
 from cosim.tuning.tune import tune
 from cosim.tuning.tuning_result import Tuning
-from fmus.cli.commands import argument
+from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 
@@ -63,9 +63,7 @@ ARGUMENTS = (
     argument(
         "--method", default="bbo", metavar="NAME", help="bbo (default), pso, ga, cma, gradient, hand, or a full name"
     ),
-    argument(
-        "--option", action="append", default=[], metavar="NAME=VALUE", help="of the method, such as population=30"
-    ),
+    repeated("--option", "NAME=VALUE", "of the method, such as population=30"),
     argument(
         "--cost",
         default="state",

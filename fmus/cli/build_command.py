@@ -14,7 +14,7 @@ from typing import Any, Literal
 from fmu_observer import OBSERVERS
 from fmu_observer.event_protocol import LATE_POLICIES, EventProtocol
 from fmus.build import build_fmu
-from fmus.cli.commands import argument
+from fmus.cli.commands import argument, repeated
 from fmus.cli.failures import EXPECTED
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
@@ -66,7 +66,7 @@ ARGUMENTS = (
     ),
     argument("-o", "--output", type=Path, default=Path(), metavar="DIR", help="folder or .fmu file (default: here)"),
     argument("--preset", metavar="P", help="preset whose values become the start values"),
-    argument("--option", action="append", default=[], metavar="K=V", help="option of the model; may be repeated"),
+    repeated("--option", "K=V", "option of the model"),
     argument(
         "--events",
         choices=("clocks", "counts"),

@@ -15,7 +15,7 @@ from typing import Any
 
 from fmus.check.findings import Class, Verdict
 from fmus.check.run import CheckReport, check_count, check_fmu
-from fmus.cli.commands import argument, one_of
+from fmus.cli.commands import argument, one_of, repeated
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from fmus.fmi.archive import open_archive
@@ -38,7 +38,7 @@ PARSER: dict[str, Any] = {}
 ARGUMENTS = (
     argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0"),
     argument("--step", type=float, metavar="H", help="communication step in s (default: the FMU's own)"),
-    argument("--start", action="append", default=[], metavar="K=V", help="start value; may be repeated"),
+    repeated("--start", "K=V", "start value"),
     argument("--timeout", type=float, default=30.0, metavar="S", help="time limit of each check in s (default 30)"),
     one_of(
         argument("--steps", type=int, metavar="N", help="steps of the longest run (default 50, within its experiment)"),

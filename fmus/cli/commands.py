@@ -129,6 +129,15 @@ def argument(*names: str, **keywords: Any) -> Argument:
     return Argument(names, keywords)
 
 
+def repeated(name: str, metavar: str, text: str, **keywords: Any) -> Argument:
+    """An argument that may be stated several times; the command gets a list.
+
+    Args:
+        name: its flag. metavar: of one value. text: what the help says of it. keywords: as for `argument`.
+    """
+    return argument(name, action="append", default=[], metavar=metavar, help=f"{text}; may be repeated", **keywords)
+
+
 def one_of(*arguments: Argument) -> ArgumentGroup:
     """Arguments of which one at most is given.
 

@@ -32,7 +32,7 @@ STEPPING = {
     "baseline update": "baseline update BASELINE",
 }
 ASKING = {
-    "certify": "certify {file}:Judged",
+    "certify": "certify {file}:Evaluated",
     "linearise": "linearise {file}:Traced",
     "show": "show TRACED",
     "export": "export TRACED OUT.ssp",

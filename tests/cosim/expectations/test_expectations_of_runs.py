@@ -258,5 +258,5 @@ def test_a_mistake_in_evaluate_is_an_expectation_that_is_not_met(monkeypatch: py
     assert not first["passed"]
     assert "ZeroDivisionError" in first["text"]
     assert not second["passed"]
-    assert "returned str; expected a list of Judged" in second["text"]
+    assert "returned str; expected a list of Evaluated" in second["text"]
     assert third["passed"]
