@@ -36,7 +36,9 @@ def rooms() -> list[str]:
 
 
 def offered() -> dict[str, Any]:
-    """Classes and functions by full name, at the place where they are defined."""
+    """Classes and functions by full name, at the place where they are defined; of a class the bases in its room too,
+    where some of its methods stand.
+    """
     named = [(room, name) for room in rooms() for name in getattr(import_module(room), "__all__", ())]
     for page in (DOCS.parent / "README.md", *DOCS.rglob("*.md")):
         for module, names in IMPORT.findall(page.read_text(encoding="utf-8")):
@@ -47,6 +49,9 @@ def offered() -> dict[str, Any]:
         home = getattr(thing, "__module__", "") or ""
         if (inspect.isclass(thing) or inspect.isfunction(thing)) and home.split(".")[0] in PACKAGES:
             things[f"{home}.{thing.__qualname__}"] = thing
+            for base in inspect.getmro(thing) if inspect.isclass(thing) else ():
+                if room_of(base.__module__) == room_of(home) and base.__doc__:
+                    things[f"{base.__module__}.{base.__qualname__}"] = base
     return things
 
 

@@ -172,7 +172,7 @@ def _spec_of_all(title: str, outcomes: Iterable[Outcome]) -> ReportSpec:
 
 def _record(scenario: Scenario, folder: Path, warn: Callable[[str], None] | None, *, keep: bool) -> None:
     """Run the plant side and write it; where the folder is kept, also what a run left that did not end."""
-    outcome = scenario.run(warn=warn or (lambda _text: None))
+    outcome = scenario.run(warn=warn or (lambda _text: None), progress=False)
     if keep or outcome.failure is None:
         write_results(outcome.result, folder, ("csv", "npy") if keep else ("npy",))
     if outcome.failure == INTERRUPTED:

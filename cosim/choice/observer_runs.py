@@ -86,7 +86,9 @@ class ObserverRuns:
             self._run(part)
 
     def _once(self, group: Sequence[Listener]) -> Outcome:
-        outcome = playback_scenario(self.scenario, self.parts, self.folder, group, self.disturb).run(warn=_ignore)
+        outcome = playback_scenario(self.scenario, self.parts, self.folder, group, self.disturb).run(
+            warn=_ignore, progress=False
+        )
         if outcome.failure == INTERRUPTED:
             raise KeyboardInterrupt
         return outcome

@@ -18,9 +18,10 @@ from cosim.tuning.evaluation import Evaluator
 from cosim.tuning.parameters import Bounds, Tunable, tunable
 from cosim.tuning.seeded_scenarios import Seeded, seeded, why_whole, with_observer
 from cosim.tuning.shifted_seeds import drawn, with_seed
-from cosim.tuning.study import Progress, Study
+from cosim.tuning.study import Study
 from cosim.tuning.tuning_files import write_tuning
 from cosim.tuning.tuning_result import Tuning
+from fmus.cli.progress import Progress, reported
 
 
 def tune(
@@ -41,7 +42,7 @@ def tune(
     retry: bool = False,
     scheduler: str | None = None,
     whole_runs: bool = False,
-    progress: Progress | None = None,
+    progress: Progress = None,
 ) -> Tuning:
     """Search a scenario's parameters for the smallest mean cost over training seeds, and validate the best with others.
 
@@ -63,7 +64,8 @@ def tune(
         resume: take over the evaluations of an earlier search there, as far as they are of this one. retry: with
             `resume`, run all again that failed.
         whole_runs: run the whole scenario for each candidate, also where a recording would do.
-        progress: called with runs done, runs in all as far as known, and what is done.
+        progress: called with runs done, runs in all as far as known, and what is done; by default a bar, where it lasts
+            and somebody can see it; False for none.
 
     Returns:
         What was found; when interrupted, what was found until then.
@@ -75,10 +77,10 @@ def tune(
         scenario, observer = with_observer(scenario, observer)
     asked, (training, validation) = tunable(scenario, observer, parameters), _seeds(seeds, validate)
     weighed_by = make_cost(cost, observer, _outputs(scenario, observer))
-    with _folder(directory, resume) as folder:
+    with _folder(directory, resume) as folder, reported(progress, "run") as report:
         by_seed, how = _by_seed(scenario, observer, asked, (*training, *validation), whole_runs)
         where: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "resume": resume, "retry": retry}
-        more: dict[str, Any] = {"options": options or {}, "iterations": iterations, "progress": progress}
+        more: dict[str, Any] = {"options": options or {}, "iterations": iterations, "progress": report}
         with Evaluator(by_seed, asked, weighed_by, folder, observer=observer, **where) as evaluator:
             study = Study(scenario, asked, evaluator, training, validation, method=method, **more)
             found = study.run(searches, how)
