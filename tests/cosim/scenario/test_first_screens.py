@@ -48,7 +48,8 @@ class Cells(HTMLParser):
             self.cells[-1] += data
 
 
-TEXTS = st.text(st.characters(exclude_characters="\r\0", exclude_categories=("Cs", "Cc")), max_size=12)
+MARKUP = ["<b>bold</b>", "a<br>b", "&lt;", "</td>", "<!-- no -->", "\"><script>x</script>"]
+TEXTS = st.sampled_from(MARKUP) | st.text(st.characters(exclude_categories=("Cs", "Cc")), max_size=12)
 
 
 @given(st.lists(st.tuples(TEXTS, TEXTS), min_size=1, max_size=SCREEN_ROWS), TEXTS)
