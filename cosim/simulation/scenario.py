@@ -49,15 +49,7 @@ class Scenario(StatedScenario, FirstScreen):
         s.balises(position="plant.position", speed="plant.speed", layout="spacing", spacing=500.0, track_end=3000.0)
         outcome = s.run()
 
-    What a call says is checked at the call, see `StatedScenario`.
-
-    Args:
-        folder: folder that relative paths start from.
-        where: file name for messages.
-        tables: the keys of a scenario file.
-
-    Raises:
-        ScenarioError: a key is unknown, or a value cannot be.
+    What a call says is checked at the call, see `StatedScenario`, which says what the arguments are too.
     """
 
     @classmethod
