@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from cosim.evaluation.roles import estimation_error, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
 
-_TEXT = re.compile(r"\s*([\d.eE+-]+?)\s*(?:m\s*)?\+\s*([\d.eE]+)\s*%\s*")
+_TEXT = re.compile(r"\s*([^\s%]+?)\s*(?:m\s*)?\+\s*([^\s%+]+)\s*%\s*")
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Allowance:
             found = cls(float(matched[1]), float(matched[2]) / 100.0) if matched else None
         except ValueError:
             found = None
-        if found is None or not found.fixed > 0.0:
+        if found is None or not (0.0 < found.fixed < inf and 0.0 <= found.share < inf):
             raise ScenarioError(f"allowance {text!r}: expected metres plus per cent of the distance, such as 5+5%.")
         return found
 

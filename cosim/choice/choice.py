@@ -27,6 +27,8 @@ PLAIN = "odometer_reset"
 """What every observer has to beat."""
 _SHOWN = 8
 """How many of the best a page draws, beside the plain odometer."""
+_CUT = 12
+"""How many rows of a group a terminal shows; all stand on the page and in the data."""
 _SHARE = Column("share", "of allowance", "%", "Largest share of the allowance in all runs that count", factor=100.0)
 _HARDER = Column("harder", "harder", "%", "The same in harder runs, which do not count", factor=100.0)
 _RMS = error_column("rms_position_error", "rms p", "m", "Position error over all runs that count")
@@ -96,7 +98,7 @@ class Choice(Readable):
         """The answer, the plain odometer beside it, the groups, what was done, and the lines for a scenario."""
         if not self.found:
             return [self.answer, *self.tables()]
-        return [self._first(), *self.tables(), self._done(), self.lines()]
+        return [self._first(), *map(_cut, self.tables()), self._done(), self.lines()]
 
     def tables(self) -> list[Table]:
         """A table for each group."""
@@ -160,9 +162,10 @@ class Choice(Readable):
         return f"{self.answer}\n{PLAIN}, the odometer alone: {self._numbers(plain)}"
 
     def _numbers(self, row: Row) -> str:
-        speed = row.score.speed_rms
-        said = f"at most {number(100.0 * row.share)} % of the allowance" if isfinite(row.share) else "diverged"
-        return f"{said}, rms {number(row.rms)} m" + ("" if speed is None else f", nominal {number(speed)} m/s")
+        if not isfinite(row.share):
+            return "diverged"
+        share = number(100.0 * row.share)
+        return f"at most {share} % of the allowance, position error {number(row.rms)} m rms"
 
     def _acting(self, row: Row) -> dict[str, str]:
         run, used = row.worst
@@ -189,6 +192,14 @@ class Choice(Readable):
             "harder": jsonable(row.harder),
             "failures": dict(row.failures),
         }
+
+
+def _cut(table: Table) -> Table:
+    """The first rows of a table, with the names of the others."""
+    left = ", ".join(str(row[0]) for row in table.rows[_CUT:])
+    if not left:
+        return table
+    return replace(table, rows=table.rows[:_CUT], notes=[*table.notes, f"likewise, or worse: {left}"])
 
 
 _GOOD = (_NAME, _SHARE, _HARDER, _RMS, _SPEED, _COST)

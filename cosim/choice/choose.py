@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from cosim.choice.allowance import Allowance, UsedAllowance
@@ -21,7 +21,7 @@ from cosim.runs.executors import make_executor
 from cosim.runs.job import Ended, Failure, Job
 from cosim.runs.keys import digest, table_content
 from cosim.simulation.scenario import Scenario
-from cosim.starter.starter import write_starter
+from cosim.starter.starter import starter
 
 SEEDS, HARDER = 4, 2.0
 """Disturbed runs that count, so that each error has both signs; and how much larger all is in the one that does not."""
@@ -120,6 +120,8 @@ def choose(
     trials = [Trial(scenario, again, granted, number, recorded=recorded) for number in range(1, seeds + 1)]
     trials.append(Trial(scenario, again, granted, seeds + 1, HARDER, recorded=recorded))
     found, interrupted = [nominal], nominal.interrupted
+    if again:
+        _require_any(nominal)
     if again and not interrupted:
         others, interrupted = _tried(trials, workers, lambda done: report("disturbed", done + 1, total))
         found += others
@@ -130,7 +132,7 @@ def choose(
 
 
 def scenario_for_fmu(path: str | Path) -> Scenario:
-    """The scenario that `cosim new` writes for a plant FMU; nothing is left of it in a file.
+    """The scenario that `cosim new` writes for a plant FMU; no file is written.
 
     Args:
         path: of the FMU.
@@ -138,12 +140,11 @@ def scenario_for_fmu(path: str | Path) -> Scenario:
     Raises:
         CosimError: the FMU cannot be read, or nothing in it looks like a train.
     """
-    with TemporaryDirectory() as folder:
-        target = Path(folder) / f"{Path(path).stem}.toml"
-        made = write_starter(Path(path).resolve(), target)
-        if made.kind != "train":
-            raise ScenarioError(f"{path}: no train in it, so there is nothing to choose for. {' '.join(made.remarks)}")
-        return Scenario.load(target)
+    file = Path(path).resolve()
+    made = starter(file, file.with_suffix(".toml"))
+    if made.kind != "train":
+        raise ScenarioError(f"{path}: no train in it, so there is nothing to choose for. {' '.join(made.remarks)}")
+    return Scenario(folder=file.parent, where=f"{file.stem}.toml", **tomllib.loads(made.text))
 
 
 def _asked(candidate: BenchmarkCandidate) -> Any:
@@ -176,10 +177,15 @@ def _tried(
 
 
 def _require_any(benchmark: ObserverBenchmark) -> None:
-    """Raise a RunError where a disturbed run could not be set up at all."""
-    if all(score.used is None for score in benchmark.scores):
-        reason = next((score.failure for score in benchmark.scores), "no observer")
-        raise RunError(f"The run '{benchmark.disturbance.name}' failed for every observer: {reason}")
+    """Raise a RunError where no observer has a position error in a run, although one could be set up."""
+    failures = [score.failure for score in benchmark.scores if score.used is None]
+    if len(failures) < len(benchmark.scores):
+        return
+    settled = (
+        f"no row lies behind the start of the evaluation (report.evaluate_after = {benchmark.spec.evaluate_after:g} s)"
+    )
+    reason = next((failure for failure in failures if failure is not None), settled)
+    raise RunError(f"The run '{benchmark.disturbance.name}' says nothing of any observer: {reason}")
 
 
 def _row(name: str, found: Sequence[ObserverBenchmark]) -> Row:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite, sqrt
+from typing import Any
 
 from cosim.choice.allowance import UsedAllowance
 from cosim.choice.candidates import BenchmarkCandidate
@@ -103,20 +104,23 @@ class Row:
 def ranked(rows: Sequence[Row]) -> list[Row]:
     """The rows in order, the best first.
 
-    Safe ones come before all others. Of safe ones those whose errors differ from the smallest by less than `TIE` of
-    the allowance are as good, and certified ones of them come first; else the error decides, and of unsafe ones the
-    share of the allowance.
+    Safe ones come before all others, in the order of their errors; but those that differ by less than `TIE` of the
+    allowance are as good: of those whose error is within it of the smallest the ones come first whose share of the
+    allowance is within it of the smallest, and of these certified ones. Of unsafe ones the share decides.
 
     Args:
         rows: in any order.
     """
     tried = [row for row in rows if row.tried]
-    limit = min((row.rms for row in tried if row.safe), default=inf) + TIE * allowed(tried)
+    error = min((row.rms for row in tried if row.safe), default=inf) + TIE * allowed(tried)
+    share = min((row.share for row in tried if row.safe and row.rms <= error), default=inf) + TIE
 
-    def place(row: Row) -> tuple[float, ...]:
+    def place(row: Row) -> tuple[Any, ...]:
         if not row.safe:
-            return 2.0, row.share, row.rms
-        return (0.0, not row.certified, row.rms) if row.rms <= limit else (1.0, row.rms)
+            return 3, row.share, row.rms, row.label
+        if row.rms > error:
+            return 2, row.rms, row.share, row.label
+        return (1, row.share, row.rms, row.label) if row.share > share else (0, not row.certified, row.rms, row.label)
 
     return [*sorted(tried, key=place), *(row for row in rows if not row.tried)]
 

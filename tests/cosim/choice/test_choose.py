@@ -1,0 +1,101 @@
+"""The choice on a small scenario: what it plays, what it knows, what it says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from small_scenarios import small
+
+import fmu_observer
+from cosim import Scenario
+from cosim.choice.choice import Choice
+from cosim.choice.choose import choose, scenario_for_fmu
+from cosim.errors import RunError, ScenarioError
+from fmus.cache import cached_fmu
+from plant_models import PLANTS
+
+FEW = ["odometer_reset", "balise_odometer_ekf", "quasi_lpv_uio", "luenberger"]
+
+
+@pytest.fixture(scope="module")
+def choice() -> Choice:
+    return choose(small(), FEW, seeds=2)
+
+
+def test_every_run_counts_but_the_harder_one(choice: Choice) -> None:
+    assert [d.name for d in choice.disturbances] == ["nominal", "seed 1", "seed 2", "harder 3"]
+    for row in choice.rows:
+        assert list(row.used) == (["nominal", "seed 1", "seed 2"] if row.tried else [])
+        assert list(row.harder) == (["harder 3"] if row.tried else [])
+    assert {row.label for row in choice.groups["not tried"]} == {"luenberger"}
+    assert choice.answer.startswith(f"use {choice.best.label}")
+
+
+def test_the_lines_to_paste_are_a_component_that_knows_the_train(choice: Choice) -> None:
+    assert "[components.observer]" in choice.lines()
+    quasi = next(row for row in choice.rows if row.label == "quasi_lpv_uio")
+    assert quasi.candidate.table.parameters["mass"] == 90e3  # of the plant, by default, in place of its own 1 kg
+    assert quasi.candidate.table.parameters["estimated_speed"] == 10.0
+
+
+def test_what_workers_find_is_what_one_process_finds(choice: Choice) -> None:
+    again = choose(small(), FEW, seeds=2, workers=2)
+    assert [(r.label, r.used, r.harder) for r in again.rows] == [(r.label, r.used, r.harder) for r in choice.rows]
+
+
+def test_the_declared_odometer_is_played_and_not_what_the_driver_hears() -> None:
+    data = small().table().model_dump(by_alias=True, exclude_unset=True)
+    del data["components"]["observer"]
+    data["connections"] = [
+        "driver.effort -> locomotive.effort",
+        "locomotive.speed -> driver.odometer",
+        {"from": "locomotive.wheel_speed", "to": "odometer.wheel_speed", "factor": 1.5},
+    ]
+    found = choose(Scenario(**data), ["odometer_reset"], seeds=0)
+    assert found.best.candidate.sources["odometer"][0] == "odometer.reading"
+    assert found.best.score.speed_rms == pytest.approx(5.0, rel=0.05)  # the odometer reads half as much again
+
+
+def test_what_fails_nominally_is_not_run_again_and_says_why() -> None:
+    scenario = small().set("observer.estimated_speed", 1e150)
+    found = choose(scenario, ["observer", "odometer_reset"], seeds=1)
+    lost = next(row for row in found.rows if row.label == "observer")
+    assert list(lost.used) == ["nominal"]
+    assert not lost.safe
+    assert "diverged" in lost.why_not()
+    assert found.best.label == "odometer_reset"
+
+
+def test_where_nothing_comes_through_there_is_no_best() -> None:
+    found = choose(small(), ["luenberger"], seeds=1)
+    assert not found.found
+    with pytest.raises(RunError, match="no observer came through"):
+        _ = found.best
+
+
+def test_a_train_of_which_nobody_says_where_it_is_is_refused() -> None:
+    data = small().table().model_dump(by_alias=True, exclude_unset=True)
+    del data["balises"], data["report"]
+    with pytest.raises(ScenarioError, match="nothing says where the train truly is"):
+        choose(Scenario(**data), ["luenberger"], seeds=0)
+
+
+def test_a_plant_fmu_alone_gets_the_scenario_of_its_starter(tmp_path: Path) -> None:
+    fmu: Any = cached_fmu(PLANTS["locomotive"](), fmi_version=3)
+    scenario = scenario_for_fmu(fmu).set("stop", 3.0)
+    with pytest.raises(RunError, match="evaluate_after = 5 s"):
+        choose(scenario, ["odometer_reset"], seeds=0)
+    scenario.set("report.evaluate_after", 1.0)
+    found = choose(scenario, ["odometer_reset", "quasi_lpv_uio"], seeds=0)
+    quasi = next(row for row in found.rows if row.label == "quasi_lpv_uio")
+    assert quasi.candidate.table.parameters["mass"] == 90e3
+    written = found.with_best().save(tmp_path / "chosen.toml")
+    assert Scenario.load(written).run(warn=lambda _: None).failure is None
+
+
+def test_an_fmu_that_is_no_train_is_refused() -> None:
+    fmu: Any = cached_fmu(fmu_observer.OBSERVERS["takagi_sugeno_cdo"](), fmi_version=3)
+    with pytest.raises(ScenarioError, match="no train in it"):
+        scenario_for_fmu(fmu)

@@ -1,0 +1,70 @@
+"""Disturbances: laws over journeys and seeds."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.choice.disturbances import Disturbance, Fault, Journey, drawn
+
+
+def journey(top: float, rate: float, cruise: float) -> Journey:
+    """Away, at top speed [m/s], and to a stop, at a rate [m/s2]."""
+    rise = top / rate
+    time = np.arange(0.0, 2.0 * rise + cruise, 0.1)
+    speed = np.interp(time, [0.0, rise, rise + cruise, 2.0 * rise + cruise], [0.0, top, top, 0.0])
+    return Journey(time, np.concatenate(([0.0], np.cumsum(0.1 * speed[:-1]))), speed)
+
+
+JOURNEYS = st.builds(journey, st.floats(5.0, 40.0), st.floats(0.3, 1.0), st.floats(10.0, 200.0))
+
+
+@given(JOURNEYS, st.integers(0, 10**6))
+def test_four_seeds_have_both_signs_of_every_error(way: Journey, seed: int) -> None:
+    found = [drawn(number, seed, way) for number in (1, 2, 3, 4)]
+    for errors in ([d.mass - 1.0 for d in found], [d.resistance - 1.0 for d in found], [d.wheel - 1.0 for d in found]):
+        assert min(errors) < 0.0 < max(errors)
+    assert {fault.kind for d in found for fault in d.faults} == {-1.0, 1.0}
+
+
+@given(JOURNEYS, st.integers(0, 10**6), st.integers(1, 9), st.sampled_from([1.0, 2.0]))
+def test_wheels_jam_while_the_train_brakes_and_skid_while_it_pulls_one_at_a_time(
+    way: Journey, seed: int, number: int, size: float
+) -> None:
+    faults = drawn(number, seed, way, size).faults
+    for fault in faults:
+        row = int(np.searchsorted(way.time, fault.onset))
+        change = np.interp(way.time[row] + 0.5, way.time, way.speed) - np.interp(
+            way.time[row] - 0.5, way.time, way.speed
+        )
+        assert change < -0.05 if fault.kind < 0.0 else change > -0.05
+        assert way.speed[row] > 1.5
+        assert 0.0 < fault.depth <= 1.0
+    ends = [fault.onset + fault.length for fault in faults]
+    assert all(end < following.onset for end, following in zip(ends, faults[1:], strict=False))
+
+
+@given(JOURNEYS, st.integers(0, 10**6), st.integers(1, 9))
+def test_slopes_follow_one_another_to_the_end(way: Journey, seed: int, number: int) -> None:
+    slopes = drawn(number, seed, way).slopes
+    assert slopes[0].onset == way.time[0]
+    for slope, following in pairwise(slopes):
+        assert slope.onset + slope.length == following.onset or abs(slope.onset + slope.length - following.onset) < 1e-9
+    assert abs(slopes[-1].onset + slopes[-1].length - way.time[-1]) < 1e-9
+    assert all(abs(slope.gradient) <= 8e-3 for slope in slopes)
+
+
+@given(JOURNEYS, st.integers(0, 10**6))
+def test_the_same_seed_gives_the_same_and_another_number_another(way: Journey, seed: int) -> None:
+    assert drawn(1, seed, way) == drawn(1, seed, way)
+    assert drawn(1, seed, way).noise != drawn(5, seed, way).noise
+
+
+def test_what_acted_is_named_by_the_fault_before_it() -> None:
+    found = Disturbance(faults=(Fault(10.0, 2.0, 1.0, -1.0), Fault(30.0, 1.0, 0.3, 1.0)))
+    assert found.cause(13.0) == "after a wheel that jams at 10 s"
+    assert found.cause(31.0) == "after a wheel that skids at 30 s"
+    assert found.cause(25.0) == ""

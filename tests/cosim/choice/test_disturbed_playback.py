@@ -1,0 +1,97 @@
+"""Disturbances between a recording and observers: what they do to what is heard and believed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from small_scenarios import small
+
+from cosim.choice.benchmark import benchmark_observers
+from cosim.choice.candidates import find_candidates
+from cosim.choice.disturbances import GRAVITY, Disturbance, Fault, Journey, Slope
+from cosim.choice.disturbed_playback import believing
+from cosim.choice.known_parameters import derived_parameters, stated_parameters
+from cosim.choice.playback import find_parts
+from cosim.results.result import Result, SignalInfo
+
+HEARD = ["odometer_reset", "takagi_sugeno_cdo:long_gaps"]
+
+
+def scores(wrong: Disturbance, observers: Any = HEARD) -> dict[str, Any]:
+    found = benchmark_observers(small(), observers, disturb=lambda _journey: wrong)
+    return {score.name: found.outcomes[score.name] for score in found.scores}
+
+
+def test_a_channel_in_which_nothing_is_wrong_changes_no_bit() -> None:
+    """The noise is too small to change a reading, and yet all blocks stand there."""
+    nothing = scores(Disturbance())
+    there = scores(Disturbance(noise=1e-300, faults=(Fault(0.1, 0.1, 0.0, 1.0),), slopes=(Slope(0.0, 0.5, 0.0),)))
+    for name, outcome in nothing.items():
+        for signal in ("position", "speed"):
+            times = np.unique(outcome.result.time)
+            before, after = (np.interp(times, o.result.time, o[f"{name}.{signal}"]) for o in (outcome, there[name]))
+            assert before.tobytes() == after.tobytes()
+
+
+def test_a_jam_and_wear_are_in_the_way_of_the_odometer() -> None:
+    """5 m in half a second at 10 m/s: 1 % more, and without the tenth in which the wheel stands."""
+    at_balises = small().balises(positions=[1e3])
+    wrong = Disturbance(wheel=1.01, faults=(Fault(0.2, 0.1, 1.0, -1.0),))
+    right, jammed = (
+        benchmark_observers(at_balises, ["odometer_reset"], disturb=lambda _journey, d=d: d).outcomes["odometer_reset"]
+        for d in (Disturbance(), wrong)
+    )
+    way, less = (o["odometer_reset.position"][-1] - o["odometer_reset.position"][0] for o in (right, jammed))
+    assert less == pytest.approx(1.01 * 0.8 * way, rel=0.03)
+
+
+def test_a_slope_is_an_effort_that_moves_nothing() -> None:
+    heard = scores(Disturbance(slopes=(Slope(0.0, 9.0, 0.01),)), ["decaying_innovation_cdo:balise_holes"])
+    (name, wrong), (_, right) = *heard.items(), *scores(Disturbance(), ["decaying_innovation_cdo:balise_holes"]).items()
+    ahead = wrong[f"{name}.speed"][-1] - right[f"{name}.speed"][-1]
+    assert ahead == pytest.approx(0.01 * GRAVITY * 0.5, rel=0.2)
+
+
+def test_observers_believe_in_another_mass_also_where_it_is_their_default() -> None:
+    scenario = small()
+    found, _ = find_candidates(scenario, find_parts(scenario), ["observer", "odometer_reset"], {})
+    own, plain = (believing(c, Disturbance(mass=1.2, resistance=0.5)).table.parameters for c in found)
+    assert own["mass"] == pytest.approx(1.2 * 90e3)
+    assert own["davis_a"] == pytest.approx(450.0)
+    assert "mass" not in plain
+
+
+def test_the_mass_of_a_train_that_nobody_states_is_fitted_to_its_run() -> None:
+    scenario = small()
+    parts = replace(find_parts(scenario), observers=())
+    time = np.arange(0.0, 60.0, 0.1)
+    speed = 10.0 * np.sin(time / 15.0) ** 2 + 3.0
+    mass, rate = 420e3, np.gradient(speed, time)
+    effort = mass * (rate + 0.01 + 3.6e-4 * speed + 1.8365e-5 * speed**2)
+    names = ("locomotive.position", "locomotive.speed", "driver.effort", "odometer.reading")
+    table = np.empty(len(time), dtype=[("time", float), *((name, float) for name in names)])
+    table["time"] = time
+    for name, values in zip(names, (np.cumsum(speed) * 0.1, speed, effort, speed), strict=True):
+        table[name] = values
+    found = derived_parameters({}, parts, Result(table, [SignalInfo(name) for name in names]))
+    assert found["mass"][0] == pytest.approx(mass, rel=0.02)
+    assert found["davis_a"][0] == pytest.approx(0.01 * found["mass"][0])
+    assert found["estimated_speed"][0] == speed[0]
+    assert found["odometer_period"][0] == pytest.approx(0.1)
+    stated = stated_parameters(scenario, parts)
+    assert derived_parameters(stated, parts, Result(table, []))["mass"][0] == 90e3
+
+
+def test_a_journey_is_what_it_says() -> None:
+    found: list[Journey] = []
+
+    def seen(journey: Journey) -> Disturbance:
+        found.append(journey)
+        return Disturbance()
+
+    benchmark_observers(small(), ["odometer_reset"], disturb=seen)
+    assert found[0].time[-1] == pytest.approx(0.5)
+    assert found[0].position[-1] == pytest.approx(5.0, abs=0.1)

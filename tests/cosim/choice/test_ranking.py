@@ -1,0 +1,73 @@
+"""The order of observers: laws over any shares and errors."""
+
+from __future__ import annotations
+
+from math import inf
+from types import SimpleNamespace
+from typing import Any, cast
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.choice.allowance import UsedAllowance
+from cosim.choice.observer_scores import ObserverScore, gap_certified
+from cosim.choice.ranking import TIE, Row, allowed, ranked
+
+ALLOWED = 10.0
+
+
+def row(name: str, runs: list[tuple[float, float]], certified: bool, failed: bool = False) -> Row:
+    """An observer from shares and errors in runs."""
+    gap = gap_certified(10.0 if certified else 0.1, 1.0, 1.0)
+    used = {f"seed {i}": UsedAllowance(share, 1.0, rms, ALLOWED) for i, (share, rms) in enumerate(runs)}
+    failures = {"seed 0": "diverged"} if failed and runs else {}
+    score = ObserverScore(name, name, "m", "defaults", certificate=gap)
+    return Row(score, cast(Any, SimpleNamespace(name=name)), used, {}, failures)
+
+
+RUNS = st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(0.0, 30.0)), min_size=2, max_size=2)
+ROWS = st.lists(
+    st.builds(row, st.uuids().map(str), RUNS, st.booleans(), st.booleans()),
+    min_size=1,
+    max_size=8,
+    unique_by=lambda r: r.label,
+)
+
+
+@given(ROWS, st.randoms())
+def test_the_order_does_not_depend_on_the_order_of_listing(rows: list[Row], chance: Any) -> None:
+    shuffled = list(rows)
+    chance.shuffle(shuffled)
+    assert [r.label for r in ranked(rows)] == [r.label for r in ranked(shuffled)]
+
+
+@given(ROWS)
+def test_safe_ones_come_first_and_the_first_is_within_a_tie_of_the_smallest_error(rows: list[Row]) -> None:
+    found = ranked(rows)
+    safe = [r.safe for r in found]
+    assert safe == sorted(safe, reverse=True)
+    if found[0].safe:
+        assert found[0].rms <= min(r.rms for r in found if r.safe) + TIE * ALLOWED
+        close = [r for r in found if r.safe and r.rms <= min(r.rms for r in found if r.safe) + TIE * ALLOWED]
+        tied = [r for r in close if r.share <= min(other.share for other in close) + TIE]
+        assert found[0] in tied
+        assert found[0].certified == any(r.certified for r in tied)
+    else:
+        assert found[0].share == min(r.share for r in found)
+
+
+@given(RUNS, st.booleans())
+def test_one_that_fails_in_a_run_that_counts_is_not_safe_and_says_why(runs: list[Any], certified: bool) -> None:
+    lost = row("lost", runs, certified, failed=True)
+    assert (lost.safe, lost.share, lost.rms) == (False, inf, inf)
+    assert "diverged" in lost.why_not()
+
+
+def test_one_that_was_not_tried_comes_last() -> None:
+    left, bad = row("left", [], True), row("bad", [(9.0, 1.0)], False)
+    assert [r.label for r in ranked([left, bad])] == ["bad", "left"]
+    assert allowed([left, bad]) == ALLOWED
+    assert bad.why_not({"seed 0": "after a wheel that jams at 3 s"}) == (
+        "its gains are certified for gaps up to 0.100 s, here are 1.00 s; 9.00 times the allowance in seed 0 at 1 s, "
+        "after a wheel that jams at 3 s"
+    )
