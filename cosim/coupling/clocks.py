@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from cosim.components.component import Component
-from cosim.coupling.connection import Link, split_name
+from cosim.coupling.connection import Link, split_name, take_source
 from cosim.errors import CouplingError
 from fmus.fmi.elements import described
 
@@ -57,12 +57,7 @@ def connect_clocks(
         if made is None:
             others.append(pair)
             continue
-        if made.target in taken:
-            raise CouplingError(
-                f"Clock {pair[1]} has two sources, {taken[made.target]} and {pair[0]}; a clock takes one. "
-                "Remove one connection."
-            )
-        taken[made.target] = pair[0]
+        take_source(taken, made.target, pair[0], "clock")
         clocks.append(made)
         components[made.target[0]].events.pop(made.target[1], None)
     for _, target, *_ in others:

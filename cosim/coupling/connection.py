@@ -103,14 +103,27 @@ def connect(pairs: Sequence[Link], components: Mapping[str, Component]) -> list[
     taken: dict[tuple[str, str], str] = {}
     for pair in pairs:
         for made in _of_elements(pair, components):
-            if made.target in taken:
-                raise CouplingError(
-                    f"Input {'.'.join(made.target)} has two sources, {taken[made.target]} and {pair[0]}; an input "
-                    "takes one. Remove one connection."
-                )
-            taken[made.target] = pair[0]
+            take_source(taken, made.target, pair[0], "input")
             connections.append(made)
     return connections
+
+
+def take_source(taken: dict[tuple[str, str], str], target: tuple[str, str], source: str, kind: str) -> None:
+    """Note the source of a target.
+
+    Args:
+        taken: sources by target so far. target: component and signal. source: as it was written. kind: of the target,
+            in a word.
+
+    Raises:
+        CouplingError: it has a source already.
+    """
+    if target in taken:
+        raise CouplingError(
+            f"{kind.capitalize()} {'.'.join(target)} has two sources, {taken[target]} and {source}; it takes one. "
+            "Remove one connection."
+        )
+    taken[target] = source
 
 
 def _of_elements(pair: Link, components: Mapping[str, Component]) -> list[Connection]:

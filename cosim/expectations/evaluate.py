@@ -35,7 +35,7 @@ def _evaluate(place: int, item: Any, run: EvaluatedRun) -> list[Evaluated]:
     except Exception as error:  # code of others
         parts = [Evaluated(item.check, item.check, passed=False, text=f"evaluate() failed: {explained(error)}")]
     if not isinstance(parts, list) or not all(isinstance(part, Evaluated) for part in parts):
-        text = f"judge() returned {type(parts).__name__}; expected a list of Evaluated"
+        text = f"evaluate() returned {type(parts).__name__}; expected a list of Evaluated"
         parts = [Evaluated(item.check, item.check, passed=False, text=text)]
     if item.name is not None:
         parts = [replace(j, name=item.name if len(parts) == 1 else f"{item.name} ({j.name})") for j in parts]

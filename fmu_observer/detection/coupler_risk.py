@@ -9,6 +9,9 @@ import numpy as np
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
 from plant_models.hybrid.signal import discrete_output, input_signal, memory, output_signal, parameter, state
 
+_LEVELS = (("warning", "warns", 0.4, 350e3), ("alarm", "alarms", 0.6, 700e3))
+"""Of each level its name, what it does, share of the breaking load [1] and rate of the tension [N/s]."""
+
 
 class CouplerRisk(HybridSystem):
     """Risk of a coupler to break, 0, 1 or 2, from its force, estimated or measured: Bouchama 2024, section 4.2 and
@@ -51,10 +54,14 @@ class CouplerRisk(HybridSystem):
     )
     parameters = (
         parameter("break_force", "N", 850e3, "Breaking load of the coupling", min=1.0),
-        parameter("warning_share", "1", 0.4, "Share of the breaking load that warns", min=0.0, max=1.0),
-        parameter("alarm_share", "1", 0.6, "Share of the breaking load that alarms", min=0.0, max=1.0),
-        parameter("warning_rate", "N/s", 350e3, "Rate of the tension that warns", min=0.0),
-        parameter("alarm_rate", "N/s", 700e3, "Rate of the tension that alarms", min=0.0),
+        *(
+            parameter(f"{level}_share", "1", share, f"Share of the breaking load that {acts}", min=0.0, max=1.0)
+            for level, acts, share, _ in _LEVELS
+        ),
+        *(
+            parameter(f"{level}_rate", "N/s", rate, f"Rate of the tension that {acts}", min=0.0)
+            for level, acts, _, rate in _LEVELS
+        ),
         parameter("release_ratio", "1", 0.8, "Share of a limit below which its level is left", min=0.0, max=1.0),
         parameter("rate_filter_time", "s", 0.1, "Time constant of the filter of the rate", min=0.01),
         parameter("peak_hold_time", "s", 5.0, "Time for which a peak is held", min=0.0),

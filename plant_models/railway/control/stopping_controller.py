@@ -60,8 +60,10 @@ class StoppingController(HybridSystem):
         memory("integral", "m", 0.0, "Integral of the speed error, p_i"),
         memory("planned", "1", 0.0, "1 while there is a plan"),
         memory("plan_start", "s", 0.0, "Time at which the plan was made"),
-        memory("plan_speed", "m/s", 0.0, "Speed at which the plan begins"),
-        memory("plan_position", "m", 0.0, "Position at which the plan begins"),
+        *(
+            memory(f"plan_{what}", unit, 0.0, f"{what.capitalize()} at which the plan begins")
+            for what, unit in (("speed", "m/s"), ("position", "m"))
+        ),
         memory("plan_deceleration", "m/s2", 0.0, "Deceleration by the planned brake"),
         memory("plan_duration", "s", NEVER, "Time that the plan takes"),
         memory("drag_suffices", "1", 0.0, "1 where the drag alone stops the train short of the mark"),

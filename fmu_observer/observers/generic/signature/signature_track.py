@@ -21,6 +21,12 @@ from plant_models.hybrid.signal import (
     warning_output,
 )
 
+_PROPERTIES = (
+    (1, "length", "length of S1 to the middle of its branches", 0.3345),
+    (2, "short_tip", "abscissa of the right tip of S2", 0.052),
+    (3, "gap", "gap between the right-hand branches of S1", 0.0021),
+)
+"""Number of each property, its name, what it is, and its value for the nominal `van_der_pol`."""
 _CYCLES = 4.0
 """Tips before the properties count: the first two may be those of a transient."""
 _TIP_MEMORY: tuple[Signal, ...] = (
@@ -35,9 +41,7 @@ _TIP_MEMORY: tuple[Signal, ...] = (
     memory("short_before", "1", 0.0, "Largest abscissa of the short signature between the last two tips"),
     memory("tips", "1", 0.0, "Tips found since the start, or since the signal last stopped to oscillate"),
     memory("since_tip", "1", 0.0, "Samples since the last tip"),
-    memory("held_length", "1", 0.0, "Property r1 at the last tip"),
-    memory("held_short_tip", "1", 0.0, "Property r2 at the last tip"),
-    memory("held_gap", "1", 0.0, "Property r3 at the last tip"),
+    *(memory(f"held_{name}", "1", 0.0, f"Property r{number} at the last tip") for number, name, *_ in _PROPERTIES),
 )
 
 
@@ -61,7 +65,6 @@ _PRINTED_MEMORY: tuple[Signal, ...] = (
 
 Reading = Literal["repaired", "as_published"]
 LONG, SHORT = 100, 50  # orders of the properties that ship
-_NOMINAL = {"length": 0.3345, "short_tip": 0.052, "gap": 0.0021}
 
 
 class SignatureTrack(HybridSystem):
@@ -97,9 +100,7 @@ class SignatureTrack(HybridSystem):
     internal_step = 1e-2
     inputs = (input_signal("signal", "1", 0.0, "The signal"),)
     outputs = (
-        discrete_output("length", "1", "r1, length of S1 to the middle of its branches"),
-        discrete_output("short_tip", "1", "r2, abscissa of the right tip of S2"),
-        discrete_output("gap", "1", "r3, gap between the right-hand branches of S1"),
+        *(discrete_output(name, "1", f"r{number}, {text}") for number, name, text, _ in _PROPERTIES),
         discrete_output("abscissa", "1", "Abscissa of the newest point of S1"),
         discrete_output("ready", "1", "1 while the properties count, else 0"),
         discrete_output("noise", "1", "Deviation of the signal's noise, by third differences"),
@@ -121,7 +122,7 @@ class SignatureTrack(HybridSystem):
         parameter("patience", "s", 3.0, "Time without a tip after which the properties no longer count", min=0.0),
         *(
             parameter(f"nominal_{name}", "1", value, f"r{number} without a change")
-            for number, (name, value) in enumerate(_NOMINAL.items(), start=1)
+            for number, name, _, value in _PROPERTIES
         ),
         parameter("length_change", "1", 0.01, "Change of r1 that counts", min=0.0),
         parameter("strong_change", "1", 0.02, "Change of r1 that counts although r2 has changed", min=0.0),
