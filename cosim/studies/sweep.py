@@ -21,18 +21,19 @@ from cosim.runs.keys import code_content
 from cosim.runs.run import Run, whole
 from cosim.runs.runnable import RunnableScenario
 from cosim.scenario.override import CASE
-from cosim.studies.measures import Measure, error_measures, own_measures
+from cosim.studies.measures import Measure, error_measures, own_measures, setting_text
 from cosim.studies.sampling_plans import Mode, Range, Variation, variations
 from cosim.studies.sweep_files import MOST_PAGES, run_folder, write_index, write_outcome
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun
 from fmus.cli.progress import Progress, Report, reported
+from fmus.tables.table import FirstScreen, Parts, Table, name_column
 
 Measures = Callable[[Outcome], Mapping[str, float]]
 
 
 @dataclass(frozen=True)
-class Sweep:
+class Sweep(FirstScreen):
     """A scenario and its variations, ready to run; made by `Scenario.vary`.
 
     Args:
@@ -44,6 +45,13 @@ class Sweep:
 
     def __len__(self) -> int:
         return len(self.variations)
+
+    def first_screen(self) -> Parts:
+        """How many runs there will be, and what is varied."""
+        columns = [name_column(name, name, write=setting_text) for name in ("run", *self.names)]
+        rows = [[k, *map(settings.get, self.names)] for k, settings in enumerate(self.variations)]
+        varied = ", ".join(self.names) or "nothing"
+        return [f"{len(self)} runs of {self.scenario.name}, varied: {varied}.", Table("variations", columns, rows)]
 
     @property
     def names(self) -> list[str]:

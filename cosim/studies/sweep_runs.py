@@ -23,7 +23,7 @@ _RANGES, _MEASURES = 2, 4
 
 
 @dataclass(frozen=True)
-class SweepRun:
+class SweepRun(FirstScreen):
     """One run of a sweep.
 
     Args:
@@ -42,6 +42,12 @@ class SweepRun:
     measures: Mapping[str, float] = field(default_factory=dict)
     faults: Sequence[str] = ()
     folder: Path | None = None
+
+    def first_screen(self) -> Parts:
+        """Which run it is, why it ended early where it did, and what it left."""
+        settings = ", ".join(f"{name} = {setting_text(value)}" for name, value in self.settings.items())
+        left: Parts = [] if self.outcome is None else self.outcome.first_screen()
+        return [f"Run {self.number}: {settings or 'nothing varied'}.", self.failure or "", *left]
 
     @property
     def result(self) -> Result | None:

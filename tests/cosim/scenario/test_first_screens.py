@@ -142,7 +142,10 @@ def test_the_main_picture_is_drawn_where_nothing_is_named(outcome: cosim.Outcome
 
 
 def test_a_sweep_shows_how_many_runs_failed_and_between_what_measures_lie() -> None:
-    sweep = small().vary({"observer.estimated_speed": [9.0, 10.0, 11.0]}).run()
+    study = small().vary({"observer.estimated_speed": [9.0, 10.0, 11.0]})
+    assert fits(study).startswith("3 runs of script, varied: observer.estimated_speed.")
+    sweep = study.run()
+    assert fits(sweep[1]).startswith("Run 1: observer.estimated_speed = 10.")
     text = fits(sweep)
     assert text.startswith("3 runs; varied: observer.estimated_speed. observer.speed_error_max")
     largest = [run.measures["observer.speed_error_max"] for run in sweep.runs]
