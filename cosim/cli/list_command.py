@@ -126,12 +126,13 @@ def _scenario(name: str) -> dict[str, str]:
 def _first_screen(found: _Found, kinds: Sequence[str]) -> Output:
     """The observers to begin with, and how to see the others."""
     others = len(found.observers) - len(RECOMMENDED)
-    more = [f"{others} more: cosim list observers --all. What fits your train: cosim list --for vendor.fmu."]
+    more = [
+        "What fits your train: cosim list --for vendor.fmu; which is best there: cosim choose vendor.fmu.",
+        f"{others} more: cosim list observers --all.",
+    ]
     if len(kinds) == len(KINDS):
-        more += [
-            f"{len(found.scenarios)} scenarios: cosim list scenarios. {len(found.models)} plants and sensors: cosim "
-            "list models. By a word: cosim list balise."
-        ]
+        plants = f"{len(found.models)} plants and sensors: cosim list models"
+        more += [f"{len(found.scenarios)} scenarios: cosim list scenarios; {plants}. By a word: cosim list balise."]
     table = Table("recommended", COLUMNS, list(RECOMMENDED.items()))
     parts: Parts = ["observers to begin with:", table, "\n".join(more)]
     return Output(parts, {"recommended": dict(RECOMMENDED)} | found.data(kinds))
@@ -158,6 +159,6 @@ def _fitting(target: Path) -> Output:
     said = [f"{target} has: {', '.join(sorted(found.available & read)) or 'nothing that an observer reads'}."]
     said += ["observers that fit:" if found.names else "No observer fits."]
     rows = [[name, RECOMMENDED.get(name) or summary(known[name])] for name in found.names]
-    end = f"{len(found.misfits)} others need what is not there; --json names it for each."
+    end = f"{len(found.misfits)} others need what is not there; --json names it. Which is best: cosim choose {target}."
     data = {"available": sorted(found.available), "observers": found.names, "misfits": found.misfits}
     return Output([*said, Table("observers", COLUMNS, rows), end], data)
