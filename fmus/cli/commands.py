@@ -4,7 +4,8 @@ it. Only the file of the command in use is loaded.
 Such a file declares, as literals that are read without loading it, `GROUP`, under which the help lists it, `PLACE`, its
 number there in order of use, `HELP`, one line, and where there are any `FORMER`, old spellings with what is typed now;
 then ``EXAMPLES``, lines as they are typed, ``PARSER``, the keywords of its parser, ``ARGUMENTS``, what the parser
-takes, and a function ``execute`` unless it consists of `Actions`.
+takes, a function ``execute`` unless it consists of `Actions`, and where there are any ``FORMER_OPTIONS``, options of
+today by their former names.
 """
 
 from __future__ import annotations
@@ -160,7 +161,7 @@ def add_command(subparsers: Any, name: str, module: Any) -> None:
         subparsers: of the program. name: of the command. module: its file.
     """
     parser = subparsers.add_parser(name, **module.PARSER)
-    parser.examples = module.EXAMPLES
+    parser.examples, parser.former = module.EXAMPLES, getattr(module, "FORMER_OPTIONS", {})
     _fill(parser, module.ARGUMENTS, getattr(module, "execute", None))
 
 

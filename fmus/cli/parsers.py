@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from textwrap import fill
 from typing import Any, NoReturn
@@ -34,6 +34,7 @@ class Parser(argparse.ArgumentParser):
 
     Attributes:
         examples: lines as they are typed, which the help ends with.
+        former: options of today by their former names.
 
     Args:
         more: as for `argparse.ArgumentParser`.
@@ -42,6 +43,7 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **more: Any) -> None:
         super().__init__(**{"formatter_class": Help, **more})
         self.examples: Sequence[str] = ()
+        self.former: Mapping[str, str] = {}
 
     def format_help(self) -> str:
         """As `argparse.ArgumentParser.format_help`, with the examples."""
@@ -83,6 +85,9 @@ class Parser(argparse.ArgumentParser):
 
     def _refuse(self, unknown: Sequence[str]) -> NoReturn:
         """End because of words that nothing takes."""
+        now = self.former.get(unknown[0].partition("=")[0])
+        if now is not None:
+            self.error(f"{unknown[0]} has become {now}")
         known = [option for action in self._actions for option in action.option_strings]
         near = get_close_matches(unknown[0].partition("=")[0], known, 1) if unknown[0].startswith("-") else []
         self.error(f"no option {unknown[0]}; did you mean {near[0]}?" if near else f"not expected: {' '.join(unknown)}")

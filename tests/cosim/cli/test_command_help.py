@@ -72,6 +72,7 @@ def test_a_program_alone_shows_what_users_come_for(
         ("vendor.toml", "cosim: 'vendor.toml' is no command; did you mean 'cosim run vendor.toml'?"),
         ("vendor.fmu", "cosim: 'vendor.fmu' is no command; did you mean 'cosim new vendor.fmu'?"),
         ("run x.toml --no-reprt", "cosim run: no option --no-reprt; did you mean --no-report?"),
+        ("tune x.toml --parameters a=0:1 --judge 10:20", "cosim tune: --judge has become --validate (see"),
         ("run x.toml y.toml", "cosim run: not expected: y.toml"),
         ("baseline chek x.json", "cosim baseline: argument ACTION: invalid choice: 'chek'"),
         ("baseline check x.json --agains", "cosim baseline check: argument --against: expected one argument"),
