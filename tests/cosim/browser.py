@@ -118,9 +118,11 @@ def page_problems(path: str | Path, *, alone: bool = True) -> list[str]:
         problems += page.evaluate(STRUCTURE)
         for width in (DESKTOP, PHONE):
             page.set_viewport_size({"width": width, "height": 900})
+            page.evaluate(SETTLED)
             problems += page.evaluate(OVERFLOW, f"at {width} px")
         page.emulate_media(media="print")
         page.set_viewport_size({"width": PAPER, "height": 900})
+        page.evaluate(SETTLED)
         problems += page.evaluate(OVERFLOW, "in print") + page.evaluate(CLIPPED)
         words = page.evaluate(WORDS)
         figures = page.evaluate(FIGURES)
@@ -239,3 +241,6 @@ FIGURES = """() => document.querySelectorAll("canvas").length +
 
 READY = "() => [...document.querySelectorAll('#explorer')].every((e) => e.dataset.ready)"
 """Whether the curves of a live page are drawn."""
+
+SETTLED = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+"""What follows the size of the window has been drawn anew."""

@@ -248,15 +248,11 @@ def _verdict(runs: Sequence[OverlayRun], different: int, changes: Sequence[Card]
     failed = [run.label for run in runs if run.result.failure is not None]
     if failed:
         return Verdict(f"{', '.join(failed)} did not come to {'its' if len(failed) == 1 else 'their'} end.", "bad")
-    text = f"{len(runs)} complete {'run' if len(runs) == 1 else 'runs'}"
-    text += (
-        f"; {different} settings differ" if different else "; no setting that is known differs" if len(runs) > 1 else ""
-    )
-    rise = [f"{name.lower()}: {size} {where}" for name, size, where, _ in changes]
-    return Verdict(
-        f"{text}. {'; '.join(rise)}".rstrip() + ("." if rise else ""),
-        "doubt" if any(c[3] == "doubt" for c in changes) else "",
-    )
+    settings = "no setting that is known differs" if not different else f"{different} settings differ"
+    text = f"{len(runs)} complete runs; {'one setting differs' if different == 1 else settings}."
+    text = text if len(runs) > 1 else "One complete run."
+    found = " ".join(f"{name}: {size} {where}." for name, size, where, _ in changes)
+    return Verdict(f"{text} {found}".rstrip(), "doubt" if any(card[3] == "doubt" for card in changes) else "")
 
 
 def _sections(runs: Sequence[OverlayRun], errors: Sequence[Measured], different: list[list[str]]) -> list[Section]:

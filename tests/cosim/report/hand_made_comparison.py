@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from cosim.comparison.comparison import Comparison
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.verdict import (
-    Comparison,
     ComparisonFinding,
     Curves,
     EventComparison,

@@ -25,6 +25,7 @@ def opened(page: LivePage, folder: Path, width: int = DESKTOP) -> Iterator[Page]
     """The page from its file; no error may be on the console."""
     errors: list[str] = []
     with browser.open_page(written(page, folder / "page.html"), width=width) as shown:
+        shown.emulate_media(reduced_motion="reduce")  # nothing moves while the mouse does
         shown.on("pageerror", lambda error: errors.append(error.message))
         shown.on("console", lambda said: errors.append(said.text) if said.type == "error" else None)
         yield shown
@@ -117,7 +118,7 @@ def test_cursor_and_keys_show_values_with_units(tmp_path: Path) -> None:
         page.keyboard.press("Home")
         assert shown_range(page) == [0.0, 100.0]
         page.keyboard.press("n")
-        assert "spike" in page.locator("#explorer [role=status]").inner_text()
+        page.get_by_role("status").filter(has_text="spike").wait_for()
 
 
 def test_curves_are_hidden_and_signals_found_and_added(tmp_path: Path) -> None:
@@ -152,7 +153,7 @@ def test_a_mark_is_jumped_to_with_the_panel_that_it_is_about(tmp_path: Path) -> 
 
 def test_axes_are_chosen(tmp_path: Path) -> None:
     with opened(explored_page(), tmp_path) as page:
-        page.get_by_label("Over").select_option(label="train.position")
+        page.get_by_role("combobox", name="Over").select_option(label="train.position")
         page.wait_for_function(f"{EXPLORER}.axisName() === 'Train.position [m]'")
         page.get_by_role("button", name="Logarithmic axis, of absolute values: Speed").click()
         page.wait_for_function(f"{EXPLORER}.charts[0].plot.scales['y m/s'].distr === 3")
@@ -164,7 +165,7 @@ def test_the_difference_of_two_runs(tmp_path: Path) -> None:
     with opened(overlaid_page(), tmp_path) as page:
         assert page.locator(".entry", has_text="train.position").count() == 2
         assert page.evaluate(f"Object.keys({EXPLORER}.charts[1].limits)") == ["N", "kN"]
-        page.get_by_label("Show").select_option(label="difference to first")
+        page.get_by_role("combobox", name="Show").select_option(label="difference to first")
         page.wait_for_function("document.querySelectorAll('.entry').length === 1")
         assert page.locator(".entry .name").inner_text() == "train.position: second − first"
         place = plot(page)
@@ -185,6 +186,7 @@ def test_tables_are_sorted_filtered_chosen_and_lead_on(tmp_path: Path) -> None:
         page.get_by_label("Filter rows").fill("gain < 3")
         assert page.locator(".explored output").inner_text() == "3 of 12 rows"
         page.get_by_label("Filter rows").fill("")
+        page.locator(".strip").nth(1).scroll_into_view_if_needed()
         strip = page.locator(".strip").nth(1).bounding_box()  # the error, of which the upper half is chosen
         assert strip is not None
         page.mouse.move(strip["x"] + 10, strip["y"] + 4)

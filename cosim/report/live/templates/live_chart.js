@@ -1,6 +1,7 @@
 // One panel: its plot, its legend with the values at the cursor, its marks.
 
 const COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"];  // Okabe and Ito
+const ON_DARK = ["#56B4E9", "#E69F00", "#009E73", "#CC79A7", "#D55E00", "#F0E442"];
 const DASHES = [[], [8, 3], [3, 2], [7, 2, 2, 2], [12, 4], [6, 2, 2, 2, 2, 2]];
 const AREAS = {zone: "#56B4E9", fault: "#D55E00", phase: "#999999", detection: "#CC79A7", slip: "#E69F00"};
 const FAR = 50;  // a curve that is so much larger than the next smaller one leaves the scale
@@ -74,13 +75,15 @@ class Chart {
     if (curve.look === "true") return {stroke: themed("ink"), width: 2.6, alpha: 0.55, dash: DASHES[run % n]};
     if (curve.look === "measured") return {stroke: themed("soft"), width: 0.9, dash: DASHES[run % n]};
     if (curve.look === "wanted") return {stroke: themed("ink"), width: 1.1, dash: [2, 5]};
-    return {stroke: COLOURS[(names === 1 ? run : place) % n], width: 1.6, dash};
+    const colours = themed("dark") ? ON_DARK : COLOURS;
+    return {stroke: colours[(names === 1 ? run : place) % n], width: 1.6, dash};
   }
 
   text(part) {
     const several = this.explorer.data.recordings.filter((r) => r.curves.some((c) => c.name === part.curve.name)).length > 1;
     const run = part.curve.recording.label, minus = this.explorer.minus;
     if (minus !== null) return `${part.curve.text}: ${run} − ${this.explorer.data.recordings[minus].label}`;
+    if (several && part.curve.name === this.panel.title) return run;
     return several ? `${part.curve.text}: ${run}` : part.curve.text;
   }
 
@@ -132,7 +135,6 @@ class Chart {
       this.plot.setSelect({left: 0, width: 0, top: 0, height: 0}, false);
       this.plot.setData(data);
     }
-    this.point(explorer.cursor);
   }
 
   /** Ends of the axis of a unit; a curve that is far larger than the others does not set them. */
@@ -190,8 +192,8 @@ class Chart {
       }))],
       hooks: {
         setSelect: [(u) => { if (u.select.width > 4) explorer.zoom(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")); }],
-        setCursor: [(u) => { if (u.cursor.left >= 0 && !this.silent) explorer.point(u.posToVal(u.cursor.left, "x")); }],
-        drawClear: [(u) => this.areas(u)], draw: [(u) => this.marks(u)],
+        drawClear: [(u) => this.areas(u)],
+        draw: [(u) => { this.marks(u); queueMicrotask(() => this.point(explorer.cursor)); }],  // whose place has moved
       },
     };
   }
@@ -250,9 +252,7 @@ class Chart {
   /** Show the cursor at a place, and the values there. */
   point(place) {
     if (!this.plot) return;
-    this.silent = true;
     this.plot.setCursor(place === null ? {left: -10, top: -10} : {left: this.plot.valToPos(place, "x"), top: 0});
-    this.silent = false;
     for (const part of this.all) {
       const value = place === null ? NaN : this.valueAt(part, place);
       part.value.textContent = place === null ? "" : `${shown(value)}${part.unit === "1" ? "" : ` ${part.unit}`}`;
@@ -269,6 +269,7 @@ class Chart {
   /** Wheel, fingers: zoom about where they are, pan. */
   react(over) {
     const {explorer} = this, place = (e) => this.plot.posToVal(e.clientX - over.getBoundingClientRect().left, "x");
+    for (const kind of ["mousemove", "pointerdown"]) over.addEventListener(kind, (e) => explorer.point(place(e)));
     over.addEventListener("wheel", (e) => {
       if (!e.ctrlKey && !e.shiftKey) return;  // the page scrolls
       e.preventDefault();

@@ -197,8 +197,9 @@ class Explorer {
       this.range = await this.ends();
       await this.rebuild();
     })];
-    if (this.data.recordings.length > 1) {
-      choices.push(this.choice("Show", [[null, "values"], ...this.data.recordings.map((r, i) => [i, `difference to ${r.label}`])], (value) => {
+    const shared = this.data.recordings.map((_, i) => i).filter((i) => this.curves.some((c) => c.run === i && this.curvesOf(c.name).length > 1));
+    if (shared.length) {
+      choices.push(this.choice("Show", [[null, "values"], ...shared.map((i) => [i, `difference to ${this.data.recordings[i].label}`])], (value) => {
         this.minus = value;
         return this.rebuild();
       }));

@@ -105,7 +105,7 @@ class ExploredTable {
       entry.line.addEventListener("click", () => this.open(entry));
       entry.line.addEventListener("mouseenter", () => entry.row.classList.add("lit"));
       entry.line.addEventListener("mouseleave", () => entry.row.classList.remove("lit"));
-      entry.row.addEventListener("mouseenter", () => { entry.line.classList.add("lit"); svg.append(entry.line); });
+      entry.row.addEventListener("mouseenter", () => { entry.line.classList.add("lit"); svg.insertBefore(entry.line, svg.querySelector(".axis")); });
       entry.row.addEventListener("mouseleave", () => entry.line.classList.remove("lit"));
       svg.append(entry.line);
     }
@@ -121,9 +121,11 @@ class ExploredTable {
     const text = (y, content, style = "middle") => vector("text", {x, y, "text-anchor": style}, content);
     const group = vector("g", {class: "axis"}, vector("line", {x1: x, x2: x, y1: top, y2: bottom}), text(i % 2 ? 11 : 22, short), text(bottom + 14, shown(axis.low, 3)),
       vector("text", {x: x + 4, y: top + 10}, shown(axis.high, 3)), brush, strip, vector("title", {}, `${name}: drag to choose`));
-    const at = (e) => Math.min(Math.max((e.clientY - svg.getBoundingClientRect().top) * svg.viewBox.baseVal.height / svg.getBoundingClientRect().height, top), bottom);
     strip.addEventListener("pointerdown", (down) => {
+      down.preventDefault();
       strip.setPointerCapture(down.pointerId);
+      const box = svg.getBoundingClientRect();  // as it is now: a shorter table may move the page while the mouse stays
+      const at = (e) => Math.min(Math.max((e.clientY - box.top) * svg.viewBox.baseVal.height / box.height, top), bottom);
       const from = at(down), value = (y) => axis.low + (axis.high - axis.low) * (bottom - y) / (bottom - top);
       const move = (e) => {
         const [a, b] = [from, at(e)].sort((p, q) => p - q);
