@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from fmus.cli.commands import Argument, argument
 
@@ -27,6 +28,15 @@ MANY_RUNS = (
     argument("--retry", action="store_true", help="with --resume: run all again that failed"),
 )
 """Arguments of every command that runs many; see `cosim.runs`."""
+
+
+def many_runs(options: argparse.Namespace) -> dict[str, Any]:
+    """What `MANY_RUNS` asks for, as keywords of a study.
+
+    Args:
+        options: of the command.
+    """
+    return {key: getattr(options, key) for key in ("workers", "scheduler", "resume", "retry")}
 
 
 def settings_argument(text: str = OVERRIDES) -> Argument:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim import studies
-from cosim.cli.arguments import MANY_RUNS, QUIET, positive, scenario_arguments
+from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
 from cosim.cli.output import Warnings, ignore, print_notice
 from cosim.cli.scenarios import load_scenario, simulated_time_bar
 from cosim.errors import OutputError
@@ -199,11 +199,8 @@ def _study(scenario: Scenario, options: argparse.Namespace, directory: Path) -> 
             scenario.copy().master(log_calls=False),
             range(options.seeds),
             bar,
-            workers=options.workers,
             directory=directory,
-            resume=options.resume,
-            retry=options.retry,
-            scheduler=options.scheduler,
+            **many_runs(options),
         )
 
 

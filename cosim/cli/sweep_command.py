@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim import studies
-from cosim.cli.arguments import MANY_RUNS, QUIET, scenario_arguments
+from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, scenario_arguments
 from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError, nearest
 from cosim.results.results_folder import check_writable
@@ -70,14 +70,11 @@ def execute(options: argparse.Namespace) -> Output:
     )
     with ProgressBar("run", silent=options.quiet or options.json) as bar:
         result = sweep.run(
-            options.workers,
             progress=bar,
             keep=False,
             directory=directory.absolute(),
             folders=not options.table_only,
-            resume=options.resume,
-            retry=options.retry,
-            scheduler=options.scheduler,
+            **many_runs(options),
         )
     if options.by is not None:
         studies.write_groups(result, options.by, directory)

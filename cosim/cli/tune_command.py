@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cosim.cli.arguments import MANY_RUNS, QUIET, positive, scenario_arguments
+from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
 from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError
 from cosim.results.results_folder import check_writable
@@ -118,11 +118,8 @@ def _tuned(scenario: Scenario, options: argparse.Namespace, directory: Path) -> 
             iterations=options.iterations,
             searches=options.searches,
             options=dict(parse_setting(text) for text in options.option),
-            workers=options.workers,
-            scheduler=options.scheduler,
             directory=directory,
-            resume=options.resume,
-            retry=options.retry,
+            **many_runs(options),
             whole_runs=options.whole_runs,
             progress=bar,
         )
