@@ -63,7 +63,7 @@ class Allowance:
         position = recorded(result, spec.true_position)
         if position is None or not len(position):
             return None
-        return self.fixed + self.share * np.abs(position - _last_balise(result, position))
+        return np.asarray(self.fixed + self.share * np.abs(position - _last_balise(result, position)))
 
 
 @dataclass(frozen=True)

@@ -144,8 +144,10 @@ def _declared_period(parts: ScenarioParts) -> float | None:
     network, source = parts.table.network, parts.odometer
     if source is None:
         return None
-    if network is not None and network.period is not None and any(source in n for n in network.nodes.values()):
-        return network.period
+    if network is not None and any(source in names for names in network.nodes.values()):
+        turn = None if network.period is None else network.period * len(network.nodes)
+        if (network.cycle or turn) is not None:
+            return network.cycle or turn
     table = parts.table.components.get(source.partition(".")[0])
     system = None if table is None or table.model is None else make_system(table, "")
     if table is None or system is None:

@@ -137,9 +137,17 @@ class Train:
         made.connect("train.wheel_speed -> odometer.wheel_speed")
         if self.loss is not None:
             made.network(nodes={"odometer": ["odometer.reading"]}, period=self.period, loss_fraction=self.loss)
-        place = {"position": "train.position", "speed": "train.speed", "odometer": "odometer.reading"}
-        late = {"latency": self.latency, "missed_fraction": self.missed}
-        made.balises(layout="spacing", spacing=self.gap * self.top, track_start=0.0, track_end=5e4, **place, **late)
+        made.balises(
+            position="train.position",
+            speed="train.speed",
+            odometer="odometer.reading",
+            layout="spacing",
+            spacing=self.gap * self.top,
+            track_start=0.0,
+            track_end=5e4,
+            latency=self.latency,
+            missed_fraction=self.missed,
+        )
         return made
 
     def truth(self, hidden: int) -> Scenario:

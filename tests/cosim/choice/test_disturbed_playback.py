@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -20,8 +21,12 @@ from cosim.results.result import Result, SignalInfo
 HEARD = ["odometer_reset", "takagi_sugeno_cdo:long_gaps"]
 
 
+def always(wrong: Disturbance) -> Callable[[Journey], Disturbance]:
+    return lambda _journey: wrong
+
+
 def scores(wrong: Disturbance, observers: Any = HEARD) -> dict[str, Any]:
-    found = benchmark_observers(small(), observers, disturb=lambda _journey: wrong)
+    found = benchmark_observers(small(), observers, disturb=always(wrong))
     return {score.name: found.outcomes[score.name] for score in found.scores}
 
 
@@ -41,8 +46,8 @@ def test_a_jam_and_wear_are_in_the_way_of_the_odometer() -> None:
     at_balises = small().balises(positions=[1e3])
     wrong = Disturbance(wheel=1.01, faults=(Fault(0.2, 0.1, 1.0, -1.0),))
     right, jammed = (
-        benchmark_observers(at_balises, ["odometer_reset"], disturb=lambda _journey, d=d: d).outcomes["odometer_reset"]
-        for d in (Disturbance(), wrong)
+        benchmark_observers(at_balises, ["odometer_reset"], disturb=always(found)).outcomes["odometer_reset"]
+        for found in (Disturbance(), wrong)
     )
     way, less = (o["odometer_reset.position"][-1] - o["odometer_reset.position"][0] for o in (right, jammed))
     assert less == pytest.approx(1.01 * 0.8 * way, rel=0.03)
