@@ -19,13 +19,10 @@ from cosim.errors import OutputError
 from cosim.evaluation.consistency import filter_consistency
 from cosim.evaluation.consistency_table import consistency_table
 from cosim.evaluation.cost import cost_table
-from cosim.evaluation.error_table import error_table
 from cosim.evaluation.fault_detection import fault_detection
 from cosim.evaluation.fault_table import fault_table
-from cosim.evaluation.metrics import phase_metrics
 from cosim.expectations.evaluated import evaluated_table
 from cosim.process.last_call import LAST_CALL
-from cosim.report.page.run_verdict import observer_statuses, run_verdict
 from cosim.results.results_folder import check_writable
 from cosim.results.unfinished import UNFINISHED
 from cosim.run.outcome import Outcome
@@ -225,10 +222,7 @@ def _output(outcome: Outcome, study: Any, paths: dict[str, Path], options: argpa
     ]
     if failure is not None:
         return Output(parts, data, paths, code, [f"the run ended early: {failure}"])
-    verdict = run_verdict(
-        outcome.result, outcome.spec, outcome.expectations, observer_statuses(outcome.result, outcome.spec)
-    )
-    return Output(parts, data, paths, code, verdict=verdict.text, role=_ROLES[verdict.mood])
+    return Output(parts, data, paths, code, verdict=outcome.verdict.text, role=_ROLES[outcome.verdict.mood])
 
 
 def _unmet(expectations: Table) -> Table:
@@ -239,9 +233,8 @@ def _unmet(expectations: Table) -> Table:
 def _tables(outcome: Outcome) -> list[Table]:
     """Errors, detected faults and consistency of filters, as far as there are any."""
     result, spec = outcome.result, outcome.spec
-    metrics = [m for m in phase_metrics(result, spec) if m.speed or m.position]
     return [
-        error_table(metrics, spec),
+        outcome.errors(),
         fault_table(fault_detection(result, spec), spec),
         consistency_table(filter_consistency(result, spec), spec),
     ]

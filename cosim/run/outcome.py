@@ -17,6 +17,7 @@ from cosim.evaluation.error_table import error_table
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.evaluated import Evaluated, evaluated_table
+from cosim.report.live.live_page import Verdict
 from cosim.report.page.run_verdict import observer_statuses, run_verdict
 from cosim.results.result import Result
 from cosim.results.results_folder import REPORT, remove_report, write_results
@@ -121,15 +122,19 @@ class Outcome(FirstScreen, Mapping[str, np.ndarray]):
         """How the run ended and what matters of it in a sentence; warnings; errors of the observers over the whole run,
         or the signals.
         """
-        statuses = observer_statuses(self.result, self.spec) if len(self.time) else []
-        verdict = run_verdict(self.result, self.spec, self.expectations, statuses)
         warnings = [f"warning: {shorten(text, _LONGEST)}" for text in self.warnings]
         more = [f"... and {len(warnings) - _WARNINGS} more warnings"] if len(warnings) > _WARNINGS else []
         return [
-            f"{self.spec.title}. {verdict.text}",
+            f"{self.spec.title}. {self.verdict.text}",
             "\n".join([*warnings[:_WARNINGS], *more]),
             self._errors(replace(self.spec, phases=[])) or self.result.signals_table(),
         ]
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the run comes to, as ``text`` in a sentence or two, and as ``mood`` whether that is good."""
+        statuses = observer_statuses(self.result, self.spec) if len(self.time) else []
+        return run_verdict(self.result, self.spec, self.expectations, statuses)
 
     @property
     def failure(self) -> str | None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from cosim.drawing.style import TIME, new_figure, run_line, styled
+from cosim.drawing.style import TIME, new_figure, observer_line, styled
 from cosim.report.figures.drawing import curve, legend_above
 from cosim.results.result_data import ResultData, SignalInfo
 
@@ -29,10 +29,11 @@ def signal_figure(result: ResultData, signals: Sequence[SignalInfo]) -> Figure:
     rows = figure.subplots(max(len(units), 1), 1, sharex=True, squeeze=False)[:, 0]
     for ax, unit in zip(rows, units, strict=False):
         shown = [signal for signal in signals if signal.unit == unit]
-        for place, signal in enumerate(shown):
+        names = [signal.name for signal in shown]
+        for signal in shown:
             values = np.asarray(result[signal.name], dtype=float)
             held = "steps-post" if signal.variability == "discrete" else "default"
-            curve(ax, result.time, values, None, label=signal.name, drawstyle=held, **run_line(place + 1))
+            curve(ax, result.time, values, None, label=signal.name, drawstyle=held, **observer_line(names, signal.name))
         ax.set_ylabel(f"[{unit}]" if len(shown) > 1 else f"{shown[0].name} [{unit}]")
         if len(shown) > 1:
             legend_above(ax)

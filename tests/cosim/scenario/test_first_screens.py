@@ -95,6 +95,7 @@ def test_an_outcome_shows_how_the_run_ended_and_its_errors(outcome: cosim.Outcom
     text = fits(outcome)
     assert text.startswith("A <small> run. observer is off by at most")
     assert "\nobserver  whole run" in text
+    assert " ".join(text.split()).startswith(f"A <small> run. {outcome.verdict.text}")
     assert "&lt;small&gt;" in outcome._repr_html_()
     assert "rows from 0 to 0.5 s" in fits(outcome.result)
 
