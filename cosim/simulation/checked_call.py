@@ -136,7 +136,7 @@ class CallCheck:
         Raises:
             CosimError: it cannot be, whatever else is set.
         """
-        if keys[0] != COMPONENTS:
+        if keys[0] != COMPONENTS or len(keys) < 3:
             self.table(keys[0], keys)
             return
         name, key = keys[1:3]

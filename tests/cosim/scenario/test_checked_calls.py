@@ -147,6 +147,14 @@ def test_what_ships_is_stated_call_by_call_and_nothing_is_refused(name: str) -> 
     for expected in tables.get("expect", []):
         s.expect(**expected)
     assert s.table() == shipped.table()
+    for key, value in tables.items():
+        s.set(key, value)
+    for component, table in tables["components"].items():
+        for parameter, value in [*table.get("parameters", {}).items()][:1]:
+            s.set(f"{component}.{parameter}", value)
+        for key in table.keys() & {"preset", "label", "model", "observer"}:
+            s.set(f"{component}.{key}", table[key])
+    assert s.table() == shipped.table()
 
 
 def test_what_a_later_call_may_bring_is_left_to_the_run() -> None:
