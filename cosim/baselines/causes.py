@@ -10,7 +10,7 @@ from cosim.baselines.model_identity import Identity
 Pair = tuple[Identity, Identity]
 
 
-def same_models(before: Sequence[Identity], now: Sequence[Identity]) -> list[Pair]:
+def equal_models(before: Sequence[Identity], now: Sequence[Identity]) -> list[Pair]:
     """Components that both runs have, with what they were in each.
 
     Args:
@@ -37,11 +37,11 @@ def _of_delivery(before: Identity, now: Identity) -> Iterable[str]:
     if changes:
         yield f"{before.name}: {', '.join(changes)}"
     elif before.guid == now.guid and before.sha256 and now.sha256 and before.sha256 != now.sha256:
-        same = " and the same description" if known else ""
-        yield f"{before.name}: the file {now.file} is not the one of the baseline, though it has the same GUID{same}."
+        equal = " and the same description" if known else ""
+        yield f"{before.name}: the file {now.file} is not the one of the baseline, though it has the same GUID{equal}."
     elif before.guid != now.guid and now.kind == "FMU" and before.fmi_version == now.fmi_version:
-        same = "; its description states the same" if known else ""
-        yield f"{before.name}: a new delivery of the model '{now.model}'{same}."
+        equal = "; its description states the same" if known else ""
+        yield f"{before.name}: a new delivery of the model '{now.model}'{equal}."
 
 
 def _not_kept(pairs: Sequence[Pair]) -> Iterable[str]:

@@ -105,7 +105,7 @@ class Delivery:
         both += renamed
         used = {id(variable) for pair in renamed for variable in pair}
         return [
-            *_cut([_start(one, two) for one, two in both if not _same_start(one, two)], "start values"),
+            *_cut([_start(one, two) for one, two in both if not _equal_start(one, two)], "start values"),
             *_cut(
                 [_changed(two.name, "unit", one.unit, two.unit) for one, two in both if one.unit != two.unit], "units"
             ),
@@ -131,7 +131,7 @@ def _line(cells: Sequence[str]) -> str:
     return text.getvalue()
 
 
-def _same_start(one: DeliveredVariable, two: DeliveredVariable) -> bool:
+def _equal_start(one: DeliveredVariable, two: DeliveredVariable) -> bool:
     """Whether two start values are the same, however they are written."""
     if one.start == two.start:
         return True
@@ -181,16 +181,16 @@ def _renamed(
     """Variables that are gone, with the new one of the same causality and unit: the only one, or nearest in name."""
     gone, left, pairs = list(gone), list(new), []
     for variable in gone:
-        same = [v for v in left if _same_role(v, variable)]
-        found = max(same, key=lambda v: _alike(variable, v), default=None)
-        alone = len(same) == 1 == sum(_same_role(v, variable) for v in gone)
+        equal = [v for v in left if _equal_role(v, variable)]
+        found = max(equal, key=lambda v: _alike(variable, v), default=None)
+        alone = len(equal) == 1 == sum(_equal_role(v, variable) for v in gone)
         if found is not None and (alone or _alike(variable, found) >= _ALIKE):
             left.remove(found)
             pairs.append((variable, found))
     return pairs
 
 
-def _same_role(one: DeliveredVariable, two: DeliveredVariable) -> bool:
+def _equal_role(one: DeliveredVariable, two: DeliveredVariable) -> bool:
     return (one.causality, one.unit) == (two.causality, two.unit)
 
 

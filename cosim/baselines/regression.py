@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from cosim.baselines.baseline import Baseline
-from cosim.baselines.causes import Pair, causes, same_models
+from cosim.baselines.causes import Pair, causes, equal_models
 from cosim.baselines.draft import resolve, resolved, versions_of
 from cosim.baselines.model_identity import identities
 from cosim.comparison.compare import compare_results, run_differences
@@ -54,7 +54,7 @@ def check(
     """
     outcome = result if isinstance(result, Outcome) else None
     actual = result if isinstance(result, Result) else result.result
-    pairs = same_models(baseline.header.components, identities(actual))
+    pairs = equal_models(baseline.header.components, identities(actual))
     _demand_equal_models(pairs, baseline)
     if not len(actual.table):
         raise ComparisonError(f"The run is empty: it has no rows to compare with {baseline.label}.")

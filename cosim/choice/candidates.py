@@ -91,21 +91,21 @@ def _distinct(candidates: Sequence[BenchmarkCandidate]) -> list[BenchmarkCandida
     return [replace(c, name=f"{c.name}_{n + 1}") if n else c for c, n in zip(candidates, earlier, strict=True)]
 
 
-def _named(scenario: Scenario, parts: ScenarioParts, given: Any, known: Known) -> BenchmarkCandidate:
+def _named(scenario: Scenario, parts: ScenarioParts, stated: Any, known: Known) -> BenchmarkCandidate:
     """An observer of the scenario, or one by the name of its model, or a class or an instance from a script."""
-    if isinstance(given, str) and given in parts.observers:
-        return _own(parts, given)
+    if isinstance(stated, str) and stated in parts.observers:
+        return _own(parts, stated)
     try:
-        name = ModelName.of(given)
+        name = ModelName.of(stated)
     except ValueError as error:
         raise ScenarioError(f"{scenario.where}: {error}") from error
     model, _, preset = name.partition(":")
-    if name.given is None and preset and model in fmu_observer.OBSERVERS:
+    if name.stated is None and preset and model in fmu_observer.OBSERVERS:
         return _shipped(parts, model, known, preset)
-    if name.given is None and not names_code(name) and name not in fmu_observer.OBSERVERS:
+    if name.stated is None and not names_code(name) and name not in fmu_observer.OBSERVERS:
         others = [*parts.observers, *(n for n in train_observers() if n not in parts.observers)]
         raise ScenarioError(f"{scenario.where}: unknown observer {name!r}; {nearest(name, others)}")
-    if name.given is None:
+    if name.stated is None:
         name = ModelName.of(move_file(name, lambda path: absolute(path, ".")))
     return _shipped(parts, name, known)
 
@@ -116,7 +116,7 @@ def _own(parts: ScenarioParts, name: str) -> BenchmarkCandidate:
 
 def _shipped(parts: ScenarioParts, model: str, known: Known, preset: str | None = None) -> BenchmarkCandidate:
     """An observer with its own defaults or a preset, and what is known of the train."""
-    own = settings_of(getattr(model, "given", None))  # what an instance says of the train stands
+    own = settings_of(getattr(model, "stated", None))  # what an instance says of the train stands
     chosen = {} if preset is None else {"preset": preset}
     table = ComponentTable.model_validate({"observer": model, **chosen, **own})
     system = make_declared(table, model)
@@ -134,7 +134,7 @@ def _shipped(parts: ScenarioParts, model: str, known: Known, preset: str | None 
 
 
 def _assumed(system: Any, shared: Known) -> str:
-    given = ", ".join(f"{name} = {value:g} ({why})" for name, (value, why) in shared.items())
+    stated = ", ".join(f"{name} = {value:g} ({why})" for name, (value, why) in shared.items())
     units = {s.name: (s.start, s.unit) for s in settable(system)}
     rest = ", ".join(
         f"{f} = {units[f][0]:g}" + (f" {units[f][1]}" if units[f][1] != "1" else "")
@@ -142,7 +142,7 @@ def _assumed(system: Any, shared: Known) -> str:
         if f in units and f not in shared
     )
     return (
-        f"not set in the scenario, gains at their defaults; from the scenario: {given or 'nothing of the train'}; "
+        f"not set in the scenario, gains at their defaults; from the scenario: {stated or 'nothing of the train'}; "
         f"assumed: {rest or 'nothing'}."
     )
 

@@ -152,7 +152,7 @@ def _asked(candidate: BenchmarkCandidate) -> Any:
     model = candidate.table.observer
     if candidate.origin == "scenario" or model is None:
         return candidate.name
-    return model if model.given is not None else str(candidate.table.label)
+    return model if model.stated is not None else str(candidate.table.label)
 
 
 def _tried(

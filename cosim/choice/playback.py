@@ -292,14 +292,14 @@ def connection(link: Link, target: str) -> str | dict[str, Any]:
     """
     if len(link) == 2:
         return f"{link[0]} -> {target}"
-    given = link[2]
+    stated = link[2]
     return {
         "from": link[0],
         "to": target,
-        "factor": given.factor,
-        "offset": given.offset,
-        "units": "convert" if given.convert_units else "ignore",
-        "values": [list(pair) for pair in given.table],
+        "factor": stated.factor,
+        "offset": stated.offset,
+        "units": "convert" if stated.convert_units else "ignore",
+        "values": [list(pair) for pair in stated.table],
     }
 
 
@@ -321,10 +321,10 @@ def _recorded(component: dict[str, Any], signals: set[str]) -> dict[str, Any]:
 def _roles(table: ScenarioTable, observers: Iterable[str]) -> dict[str, Any]:
     """The report table for these observers, without what it says of others."""
     kept = {*ROLES, "phases", "zones", "evaluate_after"}
-    given = {key: value for key, value in _table(table.report).items() if key in kept}
-    given = {key: value for key, value in given.items() if key not in ROLES or value is not None}
-    given = roles_of_balises(table.balises) | given
-    return given | {"observers": list(observers)}
+    stated = {key: value for key, value in _table(table.report).items() if key in kept}
+    stated = {key: value for key, value in stated.items() if key not in ROLES or value is not None}
+    stated = roles_of_balises(table.balises) | stated
+    return stated | {"observers": list(observers)}
 
 
 def _scenario(scenario: Scenario, data: dict[str, Any]) -> Scenario:

@@ -68,7 +68,7 @@ def common_changes(comparison: ComparisonData) -> list[CommonChange]:
     found = []
     while shared := _largest_group(fits):
         fit, names = shared
-        own = [other.value for name in names for other in fits[name] if _same(fit, other)]
+        own = [other.value for name in names for other in fits[name] if _equal(fit, other)]
         fit = replace(fit, value=float(np.median(own)))
         found.append(CommonChange(fit.kind, fit.value, names, fit.unit, _text(fit, names, comparison)))
         fits = {name: own for name, own in fits.items() if name not in names}
@@ -78,14 +78,14 @@ def common_changes(comparison: ComparisonData) -> list[CommonChange]:
 def _largest_group(fits: Mapping[str, Sequence[_Fit]]) -> tuple[_Fit, list[str]] | None:
     """The change that most signals share, and their names."""
     groups = [
-        (fit, [name for name, others in fits.items() if any(_same(fit, other) for other in others)])
+        (fit, [name for name, others in fits.items() if any(_equal(fit, other) for other in others)])
         for own in fits.values()
         for fit in own
     ]
     return max(groups, key=lambda group: (len(group[1]), -KINDS.index(group[0].kind)), default=None)
 
 
-def _same(one: _Fit, two: _Fit) -> bool:
+def _equal(one: _Fit, two: _Fit) -> bool:
     return (one.kind, one.unit) == (two.kind, two.unit) and abs(one.value - two.value) <= SHARED * one.scale
 
 

@@ -318,12 +318,12 @@ class _Pair:
         if self.tolerances.ignores(name):
             return SignalComparison(name, info.unit, "ignored", tolerance)
         near = [*_nearest(name, self.extra), *_nearest(name, self.has)] if status == "missing" else []
-        equal = self._same_values(name) if status == "missing" else ""
+        equal = self._equal_values(name) if status == "missing" else ""
         return SignalComparison(
-            name, info.unit, status, tolerance, nearest=list(dict.fromkeys(near))[:3], same_values=equal
+            name, info.unit, status, tolerance, nearest=list(dict.fromkeys(near))[:3], equal_values=equal
         )
 
-    def _same_values(self, name: str) -> str:
+    def _equal_values(self, name: str) -> str:
         """A signal that only the result has, and that is this one but for its name; or an empty text."""
         reference, result = self.results
         if len(reference.time) != len(result.time):

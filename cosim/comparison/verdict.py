@@ -117,7 +117,7 @@ class SignalComparison:
     findings: Sequence[ComparisonFinding] = ()
     nearest: Sequence[str] = ()
     curves: Curves | None = None
-    same_values: str = ""
+    equal_values: str = ""
     scale: float = float("nan")
 
     @property
@@ -128,8 +128,8 @@ class SignalComparison:
     @property
     def hint(self) -> str:
         """Where a missing signal may be found, in words that follow others; empty where nothing is known."""
-        if self.same_values:
-            return f"; {self.same_values} has its values"
+        if self.equal_values:
+            return f"; {self.equal_values} has its values"
         return f"; nearest: {', '.join(self.nearest)}" if self.nearest else ""
 
     @property
@@ -272,5 +272,5 @@ def _signal_data(signal: SignalComparison) -> dict[str, Any]:
             {k: getattr(f, k) for k in ("kind", "time", "end", "size", "allowed", "text")} for f in signal.findings
         ],
         "nearest": list(signal.nearest),
-        "same_values": signal.same_values,
+        "equal_values": signal.equal_values,
     }

@@ -46,7 +46,7 @@ def _model_of(table: ComponentTable, where: str) -> Any:
     for kind, other in (("model", "observer"), ("observer", "model")):
         name = getattr(table, kind)
         if name is not None:
-            if name.given is None and str(name) not in rooms[kind] and str(name) in rooms[other]:
+            if name.stated is None and str(name) not in rooms[kind] and str(name) in rooms[other]:
                 raise ScenarioError(f"{where}: {str(name)!r} is no {kind}; write {other} = {str(name)!r}.")
             return name.load(rooms[kind], kind, where)
     return None
@@ -244,7 +244,7 @@ def _lasting(table: ComponentTable, system: HybridSystem) -> HybridSystem:
     run. An instance that a script gave may differ from others of its class, and lasts itself.
     """
     name = table.model or table.observer or ModelName()
-    lasts_itself = name.given is system
+    lasts_itself = name.stated is system
     if lasts_itself:
         return system
     options = _for_its_period(type(system), table.options, table)

@@ -103,8 +103,8 @@ def _objects(origin: Origin) -> dict[str, dict[str, Any]]:
     described = {}
     for name, table in origin.table.components.items():
         model = table.model or table.observer
-        given = None if model is None else model.given
-        if model is None or given is None or (names_code(model) and isinstance(given, type)):
+        stated = None if model is None else model.stated
+        if model is None or stated is None or (names_code(model) and isinstance(stated, type)):
             continue
         if not names_code(model):
             text = f"{name}: the class {model} stands in no file, or within a function, so nothing of it was kept."

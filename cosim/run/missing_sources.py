@@ -48,7 +48,7 @@ def _reads_speed(
 ) -> bool:
     """Whether an input is a speed of a model that ships, whose units are known to be right."""
     model = tables[component].observer or tables[component].model
-    if model is None or model.given is not None or names_code(model):
+    if model is None or model.stated is not None or names_code(model):
         return False
     unit = components[component].unit(signal)
     return unit is not None and unit.exponents == _SPEED.exponents

@@ -102,8 +102,8 @@ class Run(Job):
 
     def code(self) -> Sequence[Callable[..., Any]]:
         """`take`, and the classes that a script put into the scenario."""
-        given = self._stated.values()
-        return [self.take, *(model if isinstance(model, type) else type(model) for model in given)]
+        stated = self._stated.values()
+        return [self.take, *(model if isinstance(model, type) else type(model) for model in stated)]
 
     def moved(self, places: Mapping[str, str]) -> Run:
         """The same run with its files at other places; a class in a file keeps its name."""
@@ -132,7 +132,7 @@ class Run(Job):
     def _stated(self) -> dict[str, Any]:
         """Classes and instances that a script put into the scenario, by component: they travel as they are."""
         models = {name: table.model or table.observer for name, table in self._table.components.items()}
-        return {name: model.given for name, model in models.items() if model is not None and model.given is not None}
+        return {name: model.stated for name, model in models.items() if model is not None and model.stated is not None}
 
     def _resolved(self) -> RunnableScenario:
         """The scenario with the settings in it."""

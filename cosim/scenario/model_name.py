@@ -33,32 +33,32 @@ class ModelName(str):
 
     Attributes:
         folder: that the path of a file starts from.
-        given: the class or instance, where a script gave it; None elsewhere.
+        stated: the class or instance, where a script gave it; None elsewhere.
     """
 
     folder: Path = Path()
-    given: Any = None
+    stated: Any = None
 
     @classmethod
-    def of(cls, given: Any, folder: Path | None = None) -> ModelName:
+    def of(cls, stated: Any, folder: Path | None = None) -> ModelName:
         """The name of a model.
 
         Args:
-            given: a text, or a class or an instance. folder: that the path of a file starts from.
+            stated: a text, or a class or an instance. folder: that the path of a file starts from.
 
         Raises:
             ValueError: it is neither.
         """
-        if isinstance(given, ModelName) and given.given is not None:
-            return given
-        if isinstance(given, str):
-            name = cls(given)
-        elif _is_model(given):
-            name = cls(_findable(given))
-            name.given = given
+        if isinstance(stated, ModelName) and stated.stated is not None:
+            return stated
+        if isinstance(stated, str):
+            name = cls(stated)
+        elif _is_model(stated):
+            name = cls(_findable(stated))
+            name.stated = stated
         else:
             raise ValueError(
-                f"expected the name of a model, file.py:Class, or a {EXPECTED.noun} (got a {type(given).__name__})"
+                f"expected the name of a model, file.py:Class, or a {EXPECTED.noun} (got a {type(stated).__name__})"
             )
         name.folder = name.folder if folder is None else folder
         return name
@@ -75,8 +75,8 @@ class ModelName(str):
         Raises:
             ScenarioError: there is no such model, or it cannot be loaded.
         """
-        if self.given is not None:
-            return self.given
+        if self.stated is not None:
+            return self.stated
         try:
             if str(self) in registry:
                 return registry[str(self)]
@@ -90,29 +90,29 @@ class ModelName(str):
         )
 
 
-def settings_of(given: Any) -> dict[str, dict[str, Any]]:
+def settings_of(stated: Any) -> dict[str, dict[str, Any]]:
     """What an instance was made with, as keys of a component's table, so that a file can say it too.
 
     Args:
-        given: an instance; a class, a text or None has no settings.
+        stated: an instance; a class, a text or None has no settings.
     """
-    if given is None or isinstance(given, str | type):
+    if stated is None or isinstance(stated, str | type):
         return {}
-    if descends_from(given, SYSTEM):
-        return {"options": dict(given.options)} if given.options else {}
-    parameters = {s.name: s.start for s in PythonModel(given, {}, "script").parameter_signals}
+    if descends_from(stated, SYSTEM):
+        return {"options": dict(stated.options)} if stated.options else {}
+    parameters = {s.name: s.start for s in PythonModel(stated, {}, "script").parameter_signals}
     return {"parameters": parameters} if parameters else {}
 
 
-def _findable(given: Any) -> str:
+def _findable(stated: Any) -> str:
     try:
-        return name_of(given)
+        return name_of(stated)
     except UserFileError:
-        return (given if isinstance(given, type) else type(given)).__qualname__
+        return (stated if isinstance(stated, type) else type(stated)).__qualname__
 
 
-def _validated(given: Any, info: ValidationInfo) -> ModelName:
-    return ModelName.of(given, (info.context or {}).get("folder"))
+def _validated(stated: Any, info: ValidationInfo) -> ModelName:
+    return ModelName.of(stated, (info.context or {}).get("folder"))
 
 
 Model = Annotated[ModelName, PlainValidator(_validated), PlainSerializer(str, when_used="json")]

@@ -29,7 +29,7 @@ def component_from_script(table: Mapping[str, Any]) -> Any:
     found = by_alias(ComponentTable, table)
     models = {key: named(found[key]) for key in MODEL_KEYS if key in found}
     for model in models.values():
-        for key, settings in settings_of(getattr(model, "given", "")).items():
+        for key, settings in settings_of(getattr(model, "stated", "")).items():
             found[key] = {**settings, **found.get(key, {})}
     return plain(found | models)
 

@@ -47,8 +47,8 @@ def _twice(reason: str, lines: list[str], number: int) -> str:
     key = re.match(_KEY + "=", lines[number - 1]) if "Cannot overwrite a value" in reason else None
     if key is None:
         return ""
-    same = re.compile(rf"^\s*{re.escape(key['key'])}\s*=")
-    first = next(n for n in range(number - 1, -1, -1) if n == 0 or same.match(lines[n - 1]))
+    equal = re.compile(rf"^\s*{re.escape(key['key'])}\s*=")
+    first = next(n for n in range(number - 1, -1, -1) if n == 0 or equal.match(lines[n - 1]))
     where = f" in line {first}" if first else ""
     return f"line {number}: {key['key']} has a value{where} already; remove one of them"
 

@@ -46,22 +46,22 @@ def wrong_value(item: Mapping[str, Any]) -> str:
     Returns:
         A part of a sentence, without the place and without the value that was given.
     """
-    kind, given, context = str(item["type"]), item.get("input"), item.get("ctx", {})
+    kind, stated, context = str(item["type"]), item.get("input"), item.get("ctx", {})
     if kind == "literal_error":
         choices = _CHOICE.findall(str(context.get("expected", "")))
-        hint = nearest(given, choices) if isinstance(given, str) else ""
+        hint = nearest(stated, choices) if isinstance(stated, str) else ""
         return f"expected {context['expected']}" + (f"; {hint}" if hint.startswith("did you mean") else "")
     if kind in _BOUNDS:
         key, text = _BOUNDS[kind]
         return text.format(context[key])
     expected = _KINDS.get(kind, str(item["msg"]))
-    return expected + (_meant(given) if _NUMBER in expected and isinstance(given, str) else "")
+    return expected + (_meant(stated) if _NUMBER in expected and isinstance(stated, str) else "")
 
 
-def _meant(given: str) -> str:
+def _meant(stated: str) -> str:
     """What a text that stands in place of a number may mean."""
     for form, meant in ((_COMMA, _with_point), (_WITH_UNIT, _without_unit)):
-        found = form.fullmatch(given)
+        found = form.fullmatch(stated)
         if found is not None:
             return meant(*found.groups())
     return ""

@@ -53,10 +53,10 @@ def _times(data: Mapping[str, Any]) -> str:
 
 def _row(name: str, table: Any) -> list[str | None]:
     """A component; the name of a file without its folder."""
-    given = table if isinstance(table, Mapping) else {}
-    kind = next((key for key in (*COMPONENT_PATHS, *MODEL_KEYS) if given.get(key) is not None), "")
-    what = str(given.get(kind, ""))
-    parameters = [f"{key} = {value}" for key, value in (given.get("parameters") or {}).items()]
+    stated = table if isinstance(table, Mapping) else {}
+    kind = next((key for key in (*COMPONENT_PATHS, *MODEL_KEYS) if stated.get(key) is not None), "")
+    what = str(stated.get(kind, ""))
+    parameters = [f"{key} = {value}" for key, value in (stated.get("parameters") or {}).items()]
     shown = ", ".join(parameters[:_SHOWN]) + (f", {len(parameters) - _SHOWN} more" if len(parameters) > _SHOWN else "")
     short = Path(what).name if kind in COMPONENT_PATHS else what
-    return [name, kind, short, given.get("preset"), shown[:120] or None]
+    return [name, kind, short, stated.get("preset"), shown[:120] or None]

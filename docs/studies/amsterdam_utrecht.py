@@ -126,7 +126,7 @@ def all_gaps(found: GapErrors, quiet: GapErrors, other: GapErrors) -> str:
 
 def reported(outcome: Outcome) -> list[list[str]]:
     """Faults told and false alarms of the observers that tell any, as cells of a table."""
-    known = [entry for entry in outcome.result.summary["fault_detection"] if entry["tells"]]
+    known = [entry for entry in outcome.result.summary["fault_detection"] if entry["indicates"]]
     return [[entry["observer"], f"{entry['detected']} of {entry['faults']}", f"{entry['false']}"] for entry in known]
 
 

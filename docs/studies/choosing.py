@@ -265,7 +265,7 @@ def verdict(name: str, truth: Sequence[Row], factor: float = WITHIN) -> Verdict:
 
 
 @dataclass(frozen=True)
-class Judged:
+class Evaluated:
     """A train with what was chosen and what is true.
 
     Args:
@@ -306,7 +306,7 @@ def _nominal(found: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in found.items() if name == "nominal"}
 
 
-def judged(train: Train) -> Judged:
+def evaluated(train: Train) -> Evaluated:
     """Choose for a train, and hold it against the truth.
 
     Args:
@@ -315,10 +315,10 @@ def judged(train: Train) -> Judged:
     begin = process_time()
     choice = choose(train.scenario())
     seconds = process_time() - begin
-    return Judged(train, choice, truth_of(train, choice.benchmark), seconds)
+    return Evaluated(train, choice, truth_of(train, choice.benchmark), seconds)
 
 
-def row_of(found: Judged) -> list[str]:
+def row_of(found: Evaluated) -> list[str]:
     """A line of the table.
 
     Args:
@@ -360,7 +360,7 @@ HEADING = (
 )
 
 
-def shares(every: Sequence[Judged]) -> str:
+def shares(every: Sequence[Evaluated]) -> str:
     """How often each way of choosing is right, as a table.
 
     Args:
@@ -375,7 +375,7 @@ def shares(every: Sequence[Judged]) -> str:
     return "\n".join(lines)
 
 
-def exhibits(every: Sequence[Judged]) -> list[str]:
+def exhibits(every: Sequence[Evaluated]) -> list[str]:
     """Labels of the rows that are within `CLOSE` of the best, or tie with it, on no train.
 
     Args:
@@ -389,12 +389,12 @@ def exhibits(every: Sequence[Judged]) -> list[str]:
     return list(labels)
 
 
-def _useful(row: Row, found: Judged) -> bool:
+def _useful(row: Row, found: Evaluated) -> bool:
     """Whether it is safe, where anything is."""
     return row.safe or not any(other.safe for other in found.truth)
 
 
-def table(every: Sequence[Judged]) -> str:
+def table(every: Sequence[Evaluated]) -> str:
     """The table of trains.
 
     Args:
@@ -417,7 +417,7 @@ def main(words: Sequence[str]) -> None:
     options = parser.parse_args(words)
     every = []
     for seed in range(options.first, options.first + options.trains):
-        every.append(judged(Train.drawn(seed)))
+        every.append(evaluated(Train.drawn(seed)))
         print("| " + " | ".join(row_of(every[-1])) + " |", flush=True)
     names = ", ".join(f"`{label}`" for label in exhibits(every))
     parts = {"choices": table(every), "choice_shares": shares(every), "exhibits": f"{names}."}

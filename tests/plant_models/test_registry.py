@@ -176,7 +176,7 @@ def test_names_remember_classes_through_copies_and_processes() -> None:
     import pickle
 
     table = ComponentTable.model_validate({"model": plant_models.Train})
-    assert pickle.loads(pickle.dumps(table)).model.given is plant_models.Train
+    assert pickle.loads(pickle.dumps(table)).model.stated is plant_models.Train
     assert str(table.model) == "plant_models.railway.vehicle.train:Train"
 
 

@@ -27,7 +27,7 @@ study = _study()
 
 @pytest.mark.parametrize("seed", [1000, 1003])
 def test_what_is_chosen_is_close_to_the_best_and_safe(seed: int) -> None:
-    found = study.judged(study.Train.drawn(seed))
+    found = study.evaluated(study.Train.drawn(seed))
     assert found.chosen.close
     assert found.chosen.safe
     assert len(found.truth) > 30

@@ -25,10 +25,10 @@ CURVES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 
 
 def found(change: Change, others: int = 0) -> list[CommonChange]:
-    same = {f"other{k}": np.sin(TIME + k) for k in range(others)}
+    equal = {f"other{k}": np.sin(TIME + k) for k in range(others)}
     one = {name: curve(TIME) for name, curve in CURVES.items()}
     two = {name: change(curve) for name, curve in CURVES.items()}
-    return common_changes(compared(made(TIME, **one, **same, units=UNITS), made(TIME, **two, **same, units=UNITS)))
+    return common_changes(compared(made(TIME, **one, **equal, units=UNITS), made(TIME, **two, **equal, units=UNITS)))
 
 
 @settings(deadline=None, max_examples=15)

@@ -115,7 +115,7 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def answer(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+def response(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     """The one line that a mistake is answered with."""
     capsys.readouterr()
     try:
@@ -138,7 +138,7 @@ def test_a_mistake_in_a_scenario_is_one_line(mistake: str, in_folder: Path, caps
     if expected is None:
         text, expected = f"{text}stop = 0.5\n", "balises.stop: unknown key; stop is a key of the whole scenario"
     (in_folder / "own.toml").write_text(text, encoding="utf-8")
-    line = answer(capsys, "run", "own.toml", "--no-report", "--quiet")
+    line = response(capsys, "run", "own.toml", "--no-report", "--quiet")
     assert line.startswith("cosim: ")
     assert "own.toml" in line
     assert expected in line
@@ -192,7 +192,7 @@ def test_a_mistake_in_a_command_is_one_line(line: str, in_folder: Path, capsys: 
     (in_folder / "data.json").write_text(json.dumps({"stop": 1.0}), encoding="utf-8")
     (in_folder / "script.py").write_text("print(1)\n", encoding="utf-8")
     (in_folder / "folder").mkdir()
-    assert COMMANDS[line] in answer(capsys, *line.split())
+    assert COMMANDS[line] in response(capsys, *line.split())
 
 
 def test_a_full_disk_is_one_line_and_what_was_computed_is_shown(

@@ -177,8 +177,8 @@ def test_the_observer_beside_a_plant_is_told_all_that_is_known(tmp_path: Path) -
     )
     observer = valid(tmp_path / "m.toml").table().components["observer"]
     assert observer.observer == "quasi_lpv_uio"
-    told = {"mass": 420e3, "davis_a": 4200.0, "davis_b": 77.0, "odometer_period": 0.01}
-    assert {name: observer.parameters[name] for name in told} == told
+    reported = {"mass": 420e3, "davis_a": 4200.0, "davis_b": 77.0, "odometer_period": 0.01}
+    assert {name: observer.parameters[name] for name in reported} == reported
 
 
 def test_without_an_effort_the_odometer_is_reset_at_balises(tmp_path: Path) -> None:
