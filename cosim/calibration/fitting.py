@@ -259,9 +259,8 @@ def _remarks(found: Fit, names: tuple[str, ...], recorded: RecordedSignals, low:
             remarks.append(
                 f"Residuals of {signal} are no white noise (correlation of neighbours {found.correlation[i]:.2f}): a "
                 "sensor that filters or aggregates, an input that is not as recorded, a gradient, slip, or something "
-                f"else that the model misses. {times:.2g} samples count as one, and its share of the intervals is "
-                f"{np.sqrt(times):.2g} times wider; that covers noise of a sensor, not a model that is wrong. Check "
-                "the residuals (--plot FILE)."
+                f"else that the model misses. Of a mean {times:.2g} samples count as one; the intervals allow for it. "
+                "That covers noise of a sensor, not a model that is wrong. Check the residuals (--plot FILE)."
             )
     return remarks
 

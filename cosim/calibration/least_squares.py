@@ -11,6 +11,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from cosim.calibration.noise_model import noise_of
+
 Array = NDArray[np.float64]
 
 Simulation = Callable[[Array], Array]
@@ -18,11 +20,6 @@ Simulation = Callable[[Array], Array]
 
 _DIFFERENCE = 1e-4
 """Step of central differences, as a share of a parameter's size: a solver in the simulation may round at 1e-9."""
-_ALMOST_ONE = 0.999
-_CHANCE, _LATER_CHANCE = 2.0, 3.0
-"""Standard deviations of a correlation of white noise, 1 / sqrt(n), beyond which it counts: of samples, and of means of
-2, 4, ... of them, which are several tests more."""
-_FEWEST_MEANS = 16
 _UNSEEN = 1e12
 """Variance, in squared sizes of the parameters, of a direction that no signal shows."""
 _REPEATS = 3  # the noise is estimated anew after each fit
@@ -38,33 +35,6 @@ def _serial_correlation(residuals: Array) -> float:
     return float(np.sum(residuals[1:] * residuals[:-1])) / squares if squares > 0.0 else 0.0
 
 
-def samples_per_independent(residuals: Array, parameters: float) -> float:
-    """How many samples say as much as one with white noise, at least 1: by so much variances are larger.
-
-    Of noise of first order with correlation r it is (1 + r) / (1 - r), and means of m neighbours have m times their
-    variance over that of a sample in the place of 1. That is taken of means of 1, 2, 4, ... neighbours and the largest
-    counts, so that a slow part below faster noise is found too. Only correlations above what chance makes of white
-    noise count; negative ones, which make variances smaller, do not. A fit makes correlations smaller, by about
-    p (1 + r) / n.
-
-    Args:
-        residuals: of one signal, shape (n,). parameters: p, how many were fitted by them.
-
-    Source: Bartlett, J. Roy. Stat. Soc. 98 (1935) 536, for the factor; means, thresholds and the correction are ours,
-    their two error rates stand in docs/reference/identification.md.
-    """
-    count, found, size = len(residuals), 1.0, 1
-    while size == 1 or count >= _FEWEST_MEANS * size:
-        means = residuals[: count // size * size].reshape(-1, size).mean(axis=1)
-        correlation = _serial_correlation(means)
-        if correlation > (_CHANCE if size == 1 else _LATER_CHANCE) / np.sqrt(len(means)):
-            correlation = min(correlation + parameters * (1.0 + correlation) / len(means), _ALMOST_ONE)
-            share = size * float(np.mean(means**2) / np.mean(residuals**2))
-            found = max(found, share * (1.0 + correlation) / (1.0 - correlation))
-        size *= 2
-    return float(min(found, max(1.0, count / (parameters + 1.0))))
-
-
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Parameters of a simulation that comes nearest to measured signals.
@@ -73,7 +43,7 @@ class Fit:
         parameters: estimates, shape (p,). covariance: of them, shape (p, p).
         sizes: sizes of the parameters by which directions are compared, shape (p,).
         residuals: measured less simulated, shape (q, n). noise: their standard deviations, shape (q,).
-        correlation: of neighbouring residuals, shape (q,). samples_per_independent: see the function, shape (q,).
+        correlation: of neighbouring residuals, shape (q,). samples_per_independent: see `Noise`, shape (q,).
         jacobian: of the signals by the parameters, shape (q, n, p).
         freedom: samples less parameters. runs: simulations that it took. converged: whether it came to rest.
     """
@@ -133,8 +103,8 @@ def fit(
 ) -> Fit:
     """Fit a simulation to measured signals by least squares on residuals divided by the noise.
 
-    Derivatives are central differences. The covariance is that of the Jacobian with the noise that the residuals show;
-    where they are correlated, so many samples count as one as `samples_per_independent` says.
+    Derivatives are central differences. The covariance is that of the Jacobian with the noise that the residuals show,
+    see `noise_of`.
 
     Args:
         simulate: the signals of runs, shape (m, q, n), for parameters of shape (m, p).
@@ -229,19 +199,22 @@ def _fit(residuals: _Residuals, start: Array, noise: Array | None) -> Fit:
         found, converged = _weighted(residuals, found, weights)
         left = residuals(found * sizes)
         if noise is None:
-            shown = _deviations(left, known, np.zeros(len(known)))
-            weights = 1.0 / np.maximum(shown, 1e-12 * np.maximum(spreads, 1e-300))
+            weights = 1.0 / np.maximum(_deviations(left, known), 1e-12 * np.maximum(spreads, 1e-300))
     left, slopes = residuals(parameters := found * sizes), -residuals.jacobian(parameters)
-    counts = known.sum(axis=1)
-    shares = len(start) * counts / max(1, int(known.sum()))
-    sampled = [row[k] for row, k in zip(left, known, strict=True)]
-    alike = np.array([samples_per_independent(row, share) for row, share in zip(sampled, shares, strict=True)])
-    shown = _deviations(left, known, shares * alike / np.maximum(counts, 1))
-    covariance = _covariance(slopes, weights, shown**2 * alike, sizes)
-    correlation = np.array([_serial_correlation(row) for row in sampled])
-    freedom = max(1, int(counts.sum()) - len(start))
+    rows = zip(left, slopes * sizes, known, strict=True)
+    shown = [noise_of(row[there], slope[there]) for row, slope, there in rows]
     return Fit(
-        parameters, covariance, sizes, left, shown, correlation, alike, slopes, freedom, residuals.runs, converged
+        parameters,
+        _covariance(slopes * sizes, weights, np.array([noise.spread for noise in shown])) * np.outer(sizes, sizes),
+        sizes,
+        left,
+        np.array([noise.deviation for noise in shown]),
+        np.array([_serial_correlation(row[there]) for row, there in zip(left, known, strict=True)]),
+        np.array([noise.samples_per_independent for noise in shown]),
+        slopes,
+        max(1, int(known.sum()) - len(start)),
+        residuals.runs,
+        converged,
     )
 
 
@@ -259,24 +232,22 @@ def _weighted(residuals: _Residuals, found: Array, weights: Array) -> tuple[Arra
     return result.x, bool(result.success)
 
 
-def _deviations(residuals: Array, known: NDArray[np.bool_], shares: Array) -> Array:
-    """Standard deviations of the residuals, shape (q,), where shares of the samples went into the parameters."""
-    counts = np.maximum(known.sum(axis=1) * (1.0 - shares), 1.0)
-    return np.asarray(np.sqrt(np.sum(residuals**2, axis=1) / counts))
+def _deviations(residuals: Array, known: NDArray[np.bool_]) -> Array:
+    """Standard deviations of the residuals, shape (q,)."""
+    return np.asarray(np.sqrt(np.sum(residuals**2, axis=1) / np.maximum(known.sum(axis=1), 1)))
 
 
-def _covariance(jacobian: Array, weights: Array, variances: Array, sizes: Array) -> Array:
-    """Covariance of weighted least squares under noise of given variances, shape (p, p); infinite directions are made
-    very wide, not lost.
+def _covariance(slopes: Array, weights: Array, spreads: Array) -> Array:
+    """Covariance of weighted least squares, shape (p, p), for slopes, shape (q, n, p), and the covariances of ``J'
+    noise`` of each signal, shape (q, p, p); infinite directions are made very wide, not lost.
     """
-    rows = jacobian * sizes
-    normal = np.einsum("qni,qnj,q->ij", rows, rows, weights**2)
-    spread = np.einsum("qni,qnj,q->ij", rows, rows, weights**4 * variances)
+    normal = np.einsum("qni,qnj,q->ij", slopes, slopes, weights**2)
     values, vectors = np.linalg.eigh(normal)
     shown = values > np.finfo(float).eps * max(float(values[-1]), np.finfo(float).tiny)
     inverse = (vectors[:, shown] / values[shown]) @ vectors[:, shown].T
     hidden = vectors[:, ~shown]
-    return np.asarray((inverse @ spread @ inverse + _UNSEEN * hidden @ hidden.T) * np.outer(sizes, sizes))
+    spread = np.einsum("qij,q->ij", spreads, weights**4)
+    return np.asarray(inverse @ spread @ inverse + _UNSEEN * hidden @ hidden.T)
 
 
 @dataclass(frozen=True)
