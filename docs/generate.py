@@ -42,6 +42,9 @@ FIRST_RUN = "docs/guide/first_run.md"
 WORDS = DOCS / "scenario_keys.toml"
 PICTURE = DOCS / "images" / "main_picture.png"
 PART = r"(<!-- generated: {name} -->\n)(.*?)(<!-- end -->)"
+RUN_REQUIREMENTS = DOCS / "ci" / "requirements-run.txt"
+LEFT_OUT = ("casadi", "clarabel", "control", "matplotlib")  # tracing, certificates by a solver, conversions, figures
+OF_FMPY = ("attrs", "lark")  # of what FMPy names, all that it loads to read, check and step an FMU
 SHORTENED = ("traction zone", "braking zone", "whole run")
 
 
@@ -52,8 +55,22 @@ def main() -> None:
         text = path.read_text(encoding="utf-8")
         path.write_text(replace_part(text, name, make()), encoding="utf-8")
         print(f"{file}: {name}")
+    RUN_REQUIREMENTS.write_text(run_requirements(), encoding="utf-8")
     write_picture()
     print(PICTURE.relative_to(ROOT))
+
+
+def run_requirements() -> str:
+    """What running and comparing FMUs needs beside FMPy and this project, installed without what these name."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    kept = [text for text in project["dependencies"] if text.partition(">")[0] not in (*LEFT_OUT, "fmpy")]
+    kept += [text for text in project["optional-dependencies"]["test"] if text.startswith("pytest>")]
+    lines = [
+        "# What running, comparing and testing FMUs needs: docs/regression_tests.md. Written by docs/generate.py.",
+        "# Behind it: pip install --no-deps 'fmpy>=0.3.32' fmu-observer",
+        *sorted([*kept, *OF_FMPY]),
+    ]
+    return "\n".join(lines) + "\n"
 
 
 def part(text: str, name: str) -> str:

@@ -18,6 +18,7 @@ from cosim.simulation.scenario import Scenario
 from fmus.cli.commands import argument, one_of
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
+from plant_models.hybrid.casadi_package import demand_casadi
 
 
 def _names(text: str) -> list[str]:
@@ -71,6 +72,7 @@ ARGUMENTS = (
 
 def execute(options: argparse.Namespace) -> Output:
     """Choose, and write where the options ask for it."""
+    demand_casadi()  # hundreds of runs in plain NumPy would take hours
     for folder in (options.out, options.record):
         if folder is not None:
             check_writable(folder)

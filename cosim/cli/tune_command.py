@@ -16,6 +16,7 @@ from cosim.tuning.tuning_result import Tuning
 from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
+from plant_models.hybrid.casadi_package import demand_casadi
 
 _DONE, _NOT_BETTER = 0, 1
 
@@ -91,6 +92,7 @@ def execute(options: argparse.Namespace) -> Output:
     Raises:
         CosimError: nothing can be tuned.
     """
+    demand_casadi()  # hundreds of runs in plain NumPy would take hours
     scenario = load_scenario(options)
     directory = check_writable(
         Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_tuned"

@@ -15,6 +15,11 @@ def test_a_part_is_up_to_date(file: str, name: str) -> None:
     assert generate.part(text, name) == generate.PARTS[file, name](), "run: python docs/generate.py"
 
 
+def test_the_requirements_of_the_smallest_installation_are_up_to_date() -> None:
+    text = generate.RUN_REQUIREMENTS.read_text(encoding="utf-8")
+    assert text == generate.run_requirements(), "run: python docs/generate.py"
+
+
 def test_every_table_of_the_schema_is_on_the_page() -> None:
     tables = set(generate.schema_tables().values())
     base = generate.schema.TomlTable
