@@ -99,7 +99,9 @@ def drawn_faults() -> Scenario:
     with TemporaryDirectory() as folder:
         file = Path(folder) / "drawn.toml"
         file.write_text(found[1], encoding="utf-8")
-        return Scenario.load(file)
+        scenario = Scenario.load(file)
+    scenario.folder = PAGE.parent  # the file was temporary
+    return scenario
 
 
 def validated(
