@@ -185,6 +185,7 @@ def test_tables_are_sorted_filtered_chosen_and_lead_on(tmp_path: Path) -> None:
         assert rows.first.inner_text() == "run 0"
         page.get_by_label("Filter rows").fill("gain < 3")
         assert page.locator(".explored output").inner_text() == "3 of 12 rows"
+        assert rows.count() == 3
         page.get_by_label("Filter rows").fill("")
         page.locator(".strip").nth(1).scroll_into_view_if_needed()
         strip = page.locator(".strip").nth(1).bounding_box()  # the error, of which the upper half is chosen
