@@ -25,13 +25,12 @@ def row(name: str, runs: list[tuple[float, float]], certified: bool, failed: boo
     return Row(score, cast(Any, SimpleNamespace(name=name)), used, {}, failures)
 
 
-RUNS = st.lists(st.tuples(st.floats(0.0, 3.0), st.floats(0.0, 30.0)), min_size=2, max_size=2)
-ROWS = st.lists(
-    st.builds(row, st.uuids().map(str), RUNS, st.booleans(), st.booleans()),
-    min_size=1,
-    max_size=8,
-    unique_by=lambda r: r.label,
-)
+SHARES = st.one_of(st.sampled_from([0.0, 0.05, 0.3, 0.95, 1.2]), st.floats(0.0, 3.0))
+ERRORS = st.one_of(st.sampled_from([0.0, 0.5, 5.0]), st.floats(0.0, 30.0))
+RUNS = st.lists(st.tuples(SHARES, ERRORS), min_size=2, max_size=2)
+LOST = st.sampled_from([False, False, False, True])
+ONE = st.builds(row, st.uuids().map(str), RUNS, st.booleans(), LOST)
+ROWS = st.lists(ONE, min_size=1, max_size=8, unique_by=lambda r: r.label)
 
 
 @given(ROWS, st.randoms())
