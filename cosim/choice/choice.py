@@ -150,7 +150,7 @@ class Choice(Readable):
         Raises:
             OutputError: the folder cannot be written.
         """
-        labels = {PLAIN, *(row.label for row in self.rows[:_SHOWN])}
+        labels = {PLAIN, *(row.score.label for row in self.rows[:_SHOWN])}
         shown = replace(self.benchmark, scores=tuple(s for s in self.benchmark.scores if s.label in labels))
         good = self.found and self.best.safe
         return write_benchmark(shown, directory, Answer(self.answer, good, self.tables(), self.to_data()))

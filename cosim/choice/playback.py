@@ -229,8 +229,7 @@ def playback_scenario(
     if balises is not None:
         watched = {key: value for key in _ESTIMATES if (value := getattr(balises, key)) is not None}
         data["balises"] = watched | {"timing": balises.timing, "layout": "recorded", "file": str(folder.resolve())}
-    if network:
-        data["network"] = network
+    data |= {"network": network} if network else {}
     return _scenario(scenario, disturb(data))
 
 

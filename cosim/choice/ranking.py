@@ -36,8 +36,11 @@ class Row:
 
     @property
     def label(self) -> str:
-        """To show."""
-        return self.score.label
+        """To show; one of the scenario that has no label is named with its model."""
+        own = self.candidate
+        if own.origin != "scenario" or own.table.label is not None:
+            return self.score.label
+        return f"{own.name} ({':'.join(filter(None, (own.model, own.table.preset)))})"
 
     @property
     def tried(self) -> bool:

@@ -61,7 +61,7 @@ def test_the_declared_odometer_is_played_and_not_what_the_driver_hears() -> None
 def test_what_fails_nominally_is_not_run_again_and_says_why() -> None:
     scenario = small().set("observer.estimated_speed", 1e150)
     found = choose(scenario, ["observer", "odometer_reset"], seeds=1)
-    lost = next(row for row in found.rows if row.label == "observer")
+    lost = next(row for row in found.rows if row.label == "observer (takagi_sugeno_cdo)")
     assert list(lost.used) == ["nominal"]
     assert not lost.safe
     assert "diverged" in lost.why_not()

@@ -22,7 +22,7 @@ def row(name: str, runs: list[tuple[float, float]], certified: bool, failed: boo
     used = {f"seed {i}": UsedAllowance(share, 1.0, rms, ALLOWED) for i, (share, rms) in enumerate(runs)}
     failures = {"seed 0": "diverged"} if failed and runs else {}
     score = ObserverScore(name, name, "m", "defaults", certificate=gap)
-    return Row(score, cast(Any, SimpleNamespace(name=name)), used, {}, failures)
+    return Row(score, cast(Any, SimpleNamespace(name=name, origin="defaults")), used, {}, failures)
 
 
 SHARES = st.one_of(st.sampled_from([0.0, 0.05, 0.3, 0.95, 1.2]), st.floats(0.0, 3.0))
