@@ -116,6 +116,15 @@ class Finding:  # noqa: PLW1641 - the data class makes its hash
         return data | {name: value for name, value in further.items() if value not in (None, "", [])}
 
 
+def gap_numbers(gap: float, longest: float, lipschitz: float) -> dict[str, float]:
+    """Numbers of a condition that a gap keeps, by name with unit.
+
+    Args:
+        gap: between samples [s]. longest: that the condition allows [s]. lipschitz: constant of the model [1/s].
+    """
+    return {"gap [s]": gap, "longest_gap [s]": longest, "lipschitz [1/s]": lipschitz}
+
+
 def condition_found(
     holds: bool,
     numbers: Mapping[str, float],

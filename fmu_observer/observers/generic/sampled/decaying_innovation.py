@@ -10,7 +10,7 @@ import numpy as np
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
-from fmu_observer.certificates.finding import Finding, as_printed, condition_found
+from fmu_observer.certificates.finding import Finding, as_printed, condition_found, gap_numbers
 from fmu_observer.certificates.gap_error import GapError
 from fmu_observer.certificates.gap_findings import CONSTANT_GAP
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
@@ -159,9 +159,7 @@ class DecayingInnovation(HeldInnovation):
                 "theta [1/s]": theta,
                 "smallest_theta [1/s]": bounds.smallest_theta,
                 "printed_smallest_theta [1/s]": bounds.printed_smallest_theta,
-                "gap [s]": gap,
-                "longest_gap [s]": bounds.longest_gap,
-                "lipschitz [1/s]": self.model.lipschitz,
+                **gap_numbers(gap, bounds.longest_gap, self.model.lipschitz),
             },
             statement="theta > smallest_theta [1/s], gap <= longest_gap [s]; sufficient, a thousand times too careful; "
             "the finding about gaps is exact",

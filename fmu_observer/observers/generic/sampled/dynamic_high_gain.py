@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fmu_observer.certificates.finding import Finding, as_printed, condition_found
+from fmu_observer.certificates.finding import Finding, as_printed, condition_found, gap_numbers
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import DynamicThetaBounds, dynamic_theta_bounds
 from fmu_observer.models.observer_model import ObserverModel
@@ -146,9 +146,7 @@ class DynamicHighGain(OutputPredictor):
             numbers={
                 "theta_limit [1/s]": theta,
                 "printed_theta_limit [1/s]": bounds.theta_limit,
-                "gap [s]": gap,
-                "longest_gap [s]": bounds.longest_gap,
-                "lipschitz [1/s]": self.model.lipschitz,
+                **gap_numbers(gap, bounds.longest_gap, self.model.lipschitz),
             },
             statement="theta_limit >= printed_theta_limit [1/s], gap <= longest_gap [s]; sufficient, ten thousand "
             "times too careful; the finding about gaps is exact once theta has settled",

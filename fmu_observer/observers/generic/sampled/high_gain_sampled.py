@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fmu_observer.certificates.finding import Finding, condition_found
+from fmu_observer.certificates.finding import Finding, condition_found, gap_numbers
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import high_gain_bounds
 from fmu_observer.models.known_models import find_model
@@ -93,9 +93,7 @@ class HighGainSampled(SampledObserver):
             numbers={
                 "theta [1/s]": theta,
                 "smallest_theta [1/s]": bounds.smallest_theta,
-                "gap [s]": gap,
-                "longest_gap [s]": bounds.longest_gap,
-                "lipschitz [1/s]": model.lipschitz,
+                **gap_numbers(gap, bounds.longest_gap, model.lipschitz),
                 "largest_eigenvalue": bounds.largest,
                 "smallest_eigenvalue": bounds.smallest,
             },
