@@ -22,9 +22,18 @@ def changing_signals(runs: Sequence[OverlayRun], most: int) -> list[str]:
     common = [
         n for n in (first.table.dtype.names or ())[1:] if all(recorded(run.result, n) is not None for run in runs)
     ]
-    changes = {name: max((_change(first, run, name) for run in runs[1:]), default=0.0) for name in common}
+    changes = {name: largest_change(runs, name) for name in common}
     chosen = sorted(common, key=lambda name: -changes[name])[:most]
     return [name for name in common if name in chosen]
+
+
+def largest_change(runs: Sequence[OverlayRun], name: str) -> float:
+    """Largest difference of a signal to the first run, in ranges of its values there [1].
+
+    Args:
+        runs: from `make_runs`. name: of a signal that all have.
+    """
+    return max((_change(runs[0].result, run, name) for run in runs[1:]), default=0.0)
 
 
 def _change(first: Result, run: OverlayRun, name: str) -> float:

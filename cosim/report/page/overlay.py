@@ -18,7 +18,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
 from cosim.report.live.live_page import Card, Folded, LivePage, Panel, Section, Verdict
 from cosim.report.live.render import live_page
-from cosim.report.overlay.changing_signals import changing_signals
+from cosim.report.overlay.changing_signals import changing_signals, largest_change
 from cosim.report.overlay.overlaid_runs import OverlayRun, make_runs
 from cosim.report.overlay.overlay_measures import Measured, detailed, measured, numbers_table
 from cosim.report.page.page_files import explained, write_file, write_page
@@ -219,6 +219,7 @@ def overlay_page(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> Liv
         title=_title(runs),
         verdict=_verdict(runs, len(different), changes),
         cards=changes,
+        finding=_most_changed(runs),
         recordings=[run_recording(run.result, run.spec, run.label) for run in runs],
         panels=_panels(runs, signals),
         marks=[mark for mark in run_marks(runs[0].result, runs[0].spec) if mark.kind != "worst"],
@@ -253,6 +254,15 @@ def _verdict(runs: Sequence[OverlayRun], different: int, changes: Sequence[Card]
     text = text if len(runs) > 1 else "One complete run."
     found = " ".join(f"{name}: {size} {where}." for name, size, where, _ in changes)
     return Verdict(f"{text} {found}".rstrip(), "doubt" if any(card[3] == "doubt" for card in changes) else "")
+
+
+def _most_changed(runs: Sequence[OverlayRun]) -> str:
+    """The signal that differs most, by the range of its values in the first run; empty where none does."""
+    name = next(iter(changing_signals(runs, 1)), None)
+    share = largest_change(runs, name) if name is not None else 0.0
+    if not share > 0.0:
+        return ""
+    return f"{name} differs most between the runs, by up to {number(100.0 * share)} % of its range in {runs[0].label}."
 
 
 def _sections(runs: Sequence[OverlayRun], errors: Sequence[Measured], different: list[list[str]]) -> list[Section]:

@@ -5,6 +5,7 @@ Imports NumPy only.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -89,7 +90,9 @@ def run_panels(result: Result, spec: ReportSpec) -> list[Panel]:
         _role_panel("Slip indicators", result, spec, None, "slip_indicator"),
     ]
     found = [panel for panel in panels if panel.curves]
-    return found if any(panel.is_shown for panel in found) else [*changing_panels([result]), *found]
+    if spec.observers or recorded(result, spec.true_speed) is not None:
+        return found
+    return [*changing_panels([result]), *(replace(panel, is_shown=False) for panel in found)]
 
 
 def _known(result: Result, names: Sequence[str | None]) -> list[str]:

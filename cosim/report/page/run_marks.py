@@ -37,7 +37,8 @@ def run_marks(result: Result, spec: ReportSpec) -> list[Mark]:
     """
     worst = sorted(_largest_errors(result, spec), key=lambda mark: (mark.panel, -abs(mark.value or 0.0)))
     marks = [*worst, *_notable(result, spec)]
-    marks += [Mark("phase", p.start, f"phase {p.name}", p.end) for p in spec.phases]
+    parts = spec.phases if len(spec.phases) > 1 else ()  # a single one is the run itself
+    marks += [Mark("phase", p.start, f"phase {p.name}", p.end) for p in parts]
     marks += [Mark("zone", a, "low adhesion", b) for a, b in spec.zones]
     marks += [*_faults(result, spec), *_warnings(result, spec)]
     return [*marks, *map(_telegram, result.events)]

@@ -171,13 +171,13 @@ def _where(status: ObserverStatus) -> str:
 
 
 def largest_finding(result: Result, spec: ReportSpec, statuses: Sequence[ObserverStatus], marks: Sequence[Mark]) -> str:
-    """The largest error of all observers, and what happened at that time; empty where there is none.
+    """The largest error of all observers, and what happened at that time; without observers the first warning.
 
     Args:
         result: the run. spec: roles. statuses: from `observer_statuses`. marks: from `run_marks`.
     """
     if not statuses:
-        return ""
+        return next(iter(all_warnings(result, spec)), "")
     worst = statuses[-1]
     if worst.fails:
         error = estimation_error(result, spec, worst.name, "speed")

@@ -286,7 +286,9 @@ class Explorer {
   listSignals() {
     const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean), groups = new Map();
     for (const name of this.names) {
-      const [curve] = this.curvesOf(name), text = `${name} ${curve.unit} ${curve.label} ${curve.description}`.toLowerCase();
+      const [curve] = this.curvesOf(name);
+      if (curve.look === "allowed") continue;  // the edge of a band
+      const text = `${name} ${curve.unit} ${curve.label} ${curve.description}`.toLowerCase();
       if (!words.every((word) => text.includes(word))) continue;
       const component = name.includes(".") ? name.slice(0, name.indexOf(".")) : "";
       groups.set(component, [...(groups.get(component) ?? []), curve]);
