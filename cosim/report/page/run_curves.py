@@ -90,7 +90,8 @@ def run_panels(result: Result, spec: ReportSpec) -> list[Panel]:
         _role_panel("Slip indicators", result, spec, None, "slip_indicator"),
     ]
     found = [panel for panel in panels if panel.curves]
-    if spec.observers or recorded(result, spec.true_speed) is not None:
+    errors = any(panel.curves and panel.is_shown for panel in panels[1:])
+    if errors or recorded(result, spec.true_speed) is not None:
         return found
     return [*changing_panels([result]), *(replace(panel, is_shown=False) for panel in found)]
 
