@@ -21,7 +21,7 @@ _VALUES = {"int": "a whole number", "float": "a number, such as 0.1"}
 """What is expected, by the name that argparse has for it."""
 
 
-class Help(argparse.HelpFormatter):
+class _Help(argparse.HelpFormatter):
     """Help in paragraphs; those that begin with blanks stay as they are, as examples do."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
@@ -41,7 +41,7 @@ class Parser(argparse.ArgumentParser):
     """
 
     def __init__(self, **more: Any) -> None:
-        super().__init__(**{"formatter_class": Help, **more})
+        super().__init__(**{"formatter_class": _Help, **more})
         self.examples: Sequence[str] = ()
         self.former: Mapping[str, str] = {}
 
