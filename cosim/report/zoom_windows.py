@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -26,7 +25,6 @@ MOST = 6  # windows; more would hide what matters
 _NOT_TAKEN = ("late", "ignored", "rejected", "undelivered")
 SPIKE = 3.0  # an observer whose error leaves the scale by this factor has diverged: its error is no window
 UNITS: dict[Quantity, str] = {"speed": "m/s", "position": "m"}
-_View = Literal["errors", "slip"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,16 +33,12 @@ class ZoomWindow:
 
     Args:
         time: what it is about [s]. start, end: of the window [s]. reasons: why, the first one the title.
-        view: what to draw: both errors, or the speed error and the slip.
-        about: the observer whose error is shown whole, however large; None where the scale follows those that work.
     """
 
     time: float
     start: float
     end: float
     reasons: tuple[str, ...]
-    view: _View = "errors"
-    about: str | None = None
 
 
 def notable_windows(result: Result, spec: ReportSpec, most: int = MOST) -> list[ZoomWindow]:
@@ -85,8 +79,8 @@ class _Scale:
     def bounded(self, length: float) -> float:
         return max(min(length, self.largest), self.least)
 
-    def window(self, time: float, before: float, after: float, reason: str, view: _View = "errors") -> ZoomWindow:
-        return ZoomWindow(time, max(time - before, self.first), min(time + after, self.last), (reason,), view)
+    def window(self, time: float, before: float, after: float, reason: str) -> ZoomWindow:
+        return ZoomWindow(time, max(time - before, self.first), min(time + after, self.last), (reason,))
 
 
 def _candidates(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[ZoomWindow]:
@@ -131,7 +125,7 @@ def _largest_error(result: Result, spec: ReportSpec, scale: _Scale, quantity: Qu
     if others is not None and sizes[others] != 0.0:
         window = _worst_point(result, spec, scale, quantity, others, errors[others])
         among = "" if worst in working else " of the others"
-        yield replace(window, reasons=(window.reasons[0].replace(" error", f" error{among}", 1),), about=None)
+        yield replace(window, reasons=(window.reasons[0].replace(" error", f" error{among}", 1),))
 
 
 def _worst_point(
@@ -142,7 +136,7 @@ def _worst_point(
     row = max(int(lost[0]) - 1, 0) if len(lost) else int(np.argmax(np.abs(error)))
     size = "then without bound" if len(lost) else f"{number(float(error[row]))} {UNITS[quantity]}"
     reason = f"Largest {quantity} error, {size} ({label(spec, observer)})"
-    return replace(scale.window(float(result.time[row]), 1.5 * scale.half, 1.5 * scale.half, reason), about=observer)
+    return scale.window(float(result.time[row]), 1.5 * scale.half, 1.5 * scale.half, reason)
 
 
 def _telegrams(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[ZoomWindow]:
@@ -193,7 +187,7 @@ def _edge(scale: _Scale, zone: tuple[float, float], end: int, what: str) -> Iter
     length = zone[1] - zone[0]
     if scale.first < zone[end] < scale.last:
         before, after = scale.bounded(0.08 * length), scale.bounded(0.2 * length)
-        yield scale.window(zone[end], before, after, f"{what} at {number(zone[end])} s", "slip")
+        yield scale.window(zone[end], before, after, f"{what} at {number(zone[end])} s")
 
 
 def _indicator(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[ZoomWindow]:
@@ -209,7 +203,7 @@ def _indicator(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[Zoom
     chosen = max(false, key=lambda x: x[1] - x[0], default=None) or min(on, default=None)
     if chosen is not None:
         what = "Slip indicated outside every zone" if false else "First slip indication"
-        yield scale.window(chosen[0], 2 * scale.half, 2 * scale.half, f"{what} ({label(spec, chosen[2])})", "slip")
+        yield scale.window(chosen[0], 2 * scale.half, 2 * scale.half, f"{what} ({label(spec, chosen[2])})")
 
 
 def _largest_jump(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[ZoomWindow]:

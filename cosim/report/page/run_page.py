@@ -50,9 +50,9 @@ def write_report(result: Result, spec: ReportSpec, directory: str | Path, *, fig
 
 def _drawn(result: Result, spec: ReportSpec) -> dict[str, bytes]:
     """All pictures of a run, PNG by name."""
-    from cosim.report.figures.run_pictures import run_pictures  # noqa: PLC0415 - matplotlib only for those who draw
+    from cosim.report.figures.panels import draw_all  # noqa: PLC0415 - matplotlib only for those who draw
 
-    return run_pictures(result, spec)
+    return {panel.name: data for panel, data in draw_all(result, spec).items()}
 
 
 def write_report_page(result: Result, spec: ReportSpec, path: str | Path, *, figures: bool = False) -> Path:

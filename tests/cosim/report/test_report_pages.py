@@ -29,7 +29,6 @@ from cosim.report.figures.other_trains_figure import OtherTrainsPanel
 from cosim.report.figures.panel import Panel
 from cosim.report.figures.panels import FIGURES, draw_all, panels
 from cosim.report.figures.run_figures import AdhesionPanel, SlipPanel, SpeedPanel
-from cosim.report.figures.zooms import ZOOM_KEYS
 from cosim.report.live.first_sentence import first_sentence
 from cosim.report.live.render import live_page
 from cosim.report.page.run_page import run_page, write_report
@@ -283,7 +282,7 @@ def test_page_needs_nothing_from_outside(result: Result, tmp_path: Path) -> None
 
 def test_figures_are_drawn_where_they_are_asked_for(result: Result, tmp_path: Path) -> None:
     folder = write_report(result, synthetic_spec(), tmp_path / "out", figures=True).parent / "figures"
-    assert {p.stem for p in folder.iterdir()} == {*ZOOM_KEYS, *(panel.name for panel in PANELS)}
+    assert {p.stem for p in folder.iterdir()} == {panel.name for panel in PANELS}
     assert all(p.read_bytes().startswith(b"\x89PNG") for p in folder.iterdir())
 
 

@@ -9,16 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.colors import to_hex
 from synthetic_run import OBSERVERS, synthetic_result, synthetic_spec
 
 from cosim.evaluation.corrections import corrections, event_rows
 from cosim.evaluation.phase_details import phase_details
 from cosim.evaluation.spec import Phase, ReportSpec
-from cosim.report.figures.zooms import _zoom_figure, draw_zooms
 from cosim.report.live.render import groups
 from cosim.report.page.phases import phases_table
-from cosim.report.zoom_windows import MOST, ZoomWindow, notable_windows
+from cosim.report.zoom_windows import MOST, notable_windows
 from cosim.results.result import BaliseRecord, Result
 
 SPEC = ReportSpec(true_position="train.position", true_speed="train.speed", true_slip="train.slip", observers=["obs"])
@@ -173,26 +171,6 @@ def test_the_worst_point_is_that_of_all_observers_and_then_that_of_those_that_wo
     assert any("(discrete_uio)" in reason for reason in found if reason.startswith("Largest speed error of the others"))
 
 
-def test_the_picture_of_the_worst_point_shows_it() -> None:
-    speed = np.zeros(1001)
-    speed[700:720] = 5e4
-    result = hand_made((), None, speed, other__speed=np.full(1001, 0.1), other__position=np.full(1001, 0.1))
-    spec = replace(SPEC, observers=["other", "obs"])
-    worst = next(m for m in notable_windows(result, spec) if m.about == "obs")
-    _, high = _zoom_figure(result, spec, worst).axes[0].get_ylim()
-    assert worst.start < 70.0 < worst.end
-    assert 5e4 < high < 1e5
-
-
-def test_the_picture_of_an_error_without_bound_shows_how_it_grew() -> None:
-    result = synthetic_result(diverged="multirate_cdo")
-    worst = next(m for m in notable_windows(result, synthetic_spec()) if m.about == "multirate_cdo")
-    error = result["multirate_cdo.speed"] - result["locomotive.speed"]
-    before = np.abs(error[(result.time >= worst.start) & np.isfinite(error)]).max()
-    low, high = _zoom_figure(result, synthetic_spec(), worst).axes[0].get_ylim()
-    assert before < high - low < 3.0 * before
-
-
 @given(st.integers(0, 20), st.floats(0.0, 60.0), st.sampled_from(OBSERVERS))
 def test_windows_lie_in_the_run_and_hold_one_another_s_moment_never(seed: int, start: float, diverged: str) -> None:
     result = synthetic_result(step=0.5, seed=seed, diverged=diverged)
@@ -209,42 +187,6 @@ def test_windows_lie_in_the_run_and_hold_one_another_s_moment_never(seed: int, s
 def test_hardly_any_rows_have_no_moment(count: int) -> None:
     result = synthetic_result()
     assert notable_windows(replace(result, table=result.table[:count]), synthetic_spec()) == []
-
-
-# --- zoom figures -----------------------------------------------------------------------------------------------------
-
-
-def test_test_fmusm_shows_jumps_stamp_and_delivery() -> None:
-    events = (telegram(20.03, 0.2),)
-    result = hand_made(events, saw(events, 3.0, -1.0))
-    axes = _zoom_figure(result, SPEC, ZoomWindow(20.03, 19.0, 21.0, ("x",))).axes
-    assert [ax.get_ylabel() for ax in axes] == ["Speed error [m/s]", "Position error [m]"]
-    assert axes[1].get_xlabel() == "Time [s]"
-    assert {ax.get_xlim() for ax in axes} == {(19.0, 21.0)}
-    marks = [line for line in axes[1].lines if line.get_marker() == "o"]
-    assert [line.get_ydata().tolist() for line in marks] == [[3.0], [-1.0]]  # type: ignore[union-attr]
-    assert to_hex(marks[0].get_markerfacecolor()) == "#ffffff"
-    upright = {
-        line.get_label(): line.get_xdata()[0] for line in axes[0].lines if str(line.get_label()).startswith("balise")
-    }
-    assert upright == pytest.approx({"balise, passed": 20.03, "balise, delivered": 20.23})
-    low, high = axes[1].get_ylim()
-    assert low < -1.0 < 3.0 < high
-
-
-def test_test_fmusm_of_a_zone_shows_the_slip() -> None:
-    window = next(m for m in notable_windows(synthetic_result(), synthetic_spec()) if m.view == "slip")
-    axes = _zoom_figure(synthetic_result(), synthetic_spec(), window).axes
-    assert [ax.get_ylabel() for ax in axes] == ["Speed error [m/s]", "Slip [%]"]
-
-
-def test_test_fmusms_stand_any_value() -> None:
-    wild = synthetic_result(step=0.2)
-    for name in wild.table.dtype.names or ():
-        if name.startswith("discrete_uio"):
-            wild.table[name][::3] = 1e308
-            wild.table[name][1::3] = math.nan
-    assert 1 <= len(draw_zooms(wild, synthetic_spec())) <= MOST
 
 
 # --- phases -----------------------------------------------------------------------------------------------------------
