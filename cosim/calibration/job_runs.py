@@ -88,7 +88,8 @@ class JobRuns(Runs):
         """
         ((done),) = run_jobs([job], self._executor)
         if done.failure is not None:
-            raise CosimError(f"{self.where}: {done.failure.reason}")
+            reason = done.failure.reason
+            raise CosimError(reason if reason.startswith(self.where) else f"{self.where}: {reason}")
         return done.row
 
     def close(self) -> None:

@@ -173,4 +173,6 @@ def test_mistakes_are_reported(
     path: Path, table: Path, more: list[str], reported: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(words(path, table, *more)) == 2
-    assert reported in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert reported in said
+    assert said.count(f"{path}:") <= 1
