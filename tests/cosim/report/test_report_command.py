@@ -119,3 +119,14 @@ def test_mistakes_are_explained(
     assert message in error
     assert "Traceback" not in error
     assert list(tmp_path.iterdir()) == []
+
+
+def test_figures_are_drawn_for_one_run_and_for_several(runs: Path, tmp_path: Path) -> None:
+    folder = runs / "one" / "figures"
+    assert main(["report", str(runs / "one"), "--figures"]) == 0
+    assert {path.suffix for path in folder.iterdir()} == {".png"}
+    assert main(["report", str(runs / "one")]) == 0
+    assert list(folder.iterdir()) == []
+    both = [str(runs / "one"), str(runs / "two"), "--out", str(tmp_path / "both.html"), "--figures"]
+    assert main(["report", *both]) == 0
+    assert (tmp_path / "figures" / "overlay_speed.png").read_bytes().startswith(b"\x89PNG")

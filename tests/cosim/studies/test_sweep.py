@@ -20,7 +20,9 @@ from cosim.run.outcome import Outcome
 from cosim.runs.journal import JOURNAL, read_lines
 from cosim.studies.sampling_plans import uniform
 from cosim.studies.seed_runs import seed_study
+from cosim.studies.sweep_page import sweep_page
 from cosim.studies.sweep_result import SweepResult
+from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
 MASSES = [70e3, 110e3]
 
@@ -260,3 +262,19 @@ def test_who_interrupts_a_run_stops_the_sweep_and_keeps_what_is_done(
     assert len(begun) == 2
     assert len(json.loads((tmp_path / "index.json").read_text())["runs"]) == 2
     assert read_results(tmp_path / "run_000").failure is None
+
+
+def test_the_page_names_what_failed_the_worst_run_and_what_it_goes_with(tmp_path: Path) -> None:
+    runs = [SweepRun(n, {"train.mass": 1e3 * n}, measures={"error": float(n**2)}) for n in range(6)]
+    infinite = SweepRun(7, {"train.mass": 7e3}, measures={"error": np.inf})
+    runs += [SweepRun(6, {"train.mass": 6e3}, failure="it broke"), infinite]
+    page = sweep_page(SweepRuns(plant(), ["train.mass"], runs, {"error": "m"}), tmp_path)
+    assert page.verdict.mood == "doubt"
+    assert page.verdict.text.startswith("7 of 8 runs came to their end. error: 6.500 m in the median, 0 to 25.00 m.")
+    assert page.verdict.text.endswith("In 1 it is no finite number.")
+    assert page.finding.startswith("error is largest in run 5, 25.00 m: train.mass = 5000")
+    assert page.finding.endswith("It rises with train.mass (rank correlation 1.0).")
+    (recording,) = page.recordings
+    assert (recording.x_name, recording.x_unit) == ("train.mass", "kg")
+    np.testing.assert_array_equal(recording.curves[0].values, [0.0, 1.0, 4.0, 9.0, 16.0, 25.0, np.nan, np.inf])
+    assert [section.title for section in page.sections] == ["Runs", "What failed"]
