@@ -68,12 +68,10 @@ class Call:
         """
         ignored = tuple(ignore)
         stated = tolerance is not None or tolerances or ignored
-        # before the run: it may be long
-        wanted = _tolerances_of(Tolerances(), tolerance, tolerances, ignored) if stated else None
+        wanted = _tolerances_of(Tolerances(), tolerance, tolerances, ignored) if stated else None  # before a long run
         chosen = None if signals is None else tuple(signals)
         with after_its_delivery(path, what, folder):
-            subject = make_subject(what, folder, **arguments)
-        return cls(subject, path, wanted, chosen, every)
+            return cls(make_subject(what, folder, **arguments), path, wanted, chosen, every)
 
     @property
     def _stated(self) -> Any:
