@@ -41,7 +41,7 @@ class DeliveredVariable:
 
 
 @dataclass(frozen=True)
-class Delivery:
+class DeliveredFmu:
     """What a delivered FMU says of itself.
 
     Args:
@@ -56,7 +56,7 @@ class Delivery:
     variables: Mapping[str, DeliveredVariable] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, description: ModelDescription) -> Delivery:
+    def of(cls, description: ModelDescription) -> DeliveredFmu:
         """What is kept of a model description.
 
         Args:
@@ -78,7 +78,7 @@ class Delivery:
         return {"tool": self.tool, "date": self.date, "experiment": dict(self.experiment), "variables": lines}
 
     @classmethod
-    def from_data(cls, data: Mapping[str, Any]) -> Delivery:
+    def from_data(cls, data: Mapping[str, Any]) -> DeliveredFmu:
         """What `to_data` made plain.
 
         Args:
@@ -92,7 +92,7 @@ class Delivery:
         experiment = {str(key): str(value) for key, value in data["experiment"].items()}
         return cls(str(data["tool"]), str(data["date"]), experiment, {v.name: v for v in variables})
 
-    def changes_to(self, now: Delivery) -> list[str]:
+    def changes_to(self, now: DeliveredFmu) -> list[str]:
         """What another delivery states otherwise, in words, the likeliest causes of other outputs first.
 
         Args:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.baselines.baseline import Header
-from cosim.baselines.delivery import Delivery
+from cosim.baselines.delivery import DeliveredFmu
 from cosim.baselines.model_identity import Identity
 from cosim.baselines.recipe import Recipe
 from cosim.comparison.tolerance import Tolerances
@@ -130,7 +130,7 @@ def _header(data: Mapping[str, Any], folder: Path, version: str) -> Header:
 def _component(entry: Mapping[str, Any]) -> Identity:
     found: Identity = _known(Identity, entry)
     stated = entry.get("delivery")
-    return found if stated is None else replace(found, delivery=Delivery.from_data(stated))
+    return found if stated is None else replace(found, delivery=DeliveredFmu.from_data(stated))
 
 
 def _known(kind: Any, entry: Mapping[str, Any]) -> Any:

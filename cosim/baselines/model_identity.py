@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cosim.baselines.delivery import Delivery
+from cosim.baselines.delivery import DeliveredFmu
 from cosim.components.description import read_description
 from cosim.errors import FmuLoadError
 from cosim.results.result import Result
@@ -39,7 +39,7 @@ class Identity:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
     preset: str | None = None
-    delivery: Delivery | None = None
+    delivery: DeliveredFmu | None = None
 
 
 def identities(result: Result) -> list[Identity]:
@@ -77,10 +77,10 @@ def _vendor_file(entry: Mapping[str, Any]) -> Path | None:
     return path
 
 
-def _delivery(path: Path) -> Delivery | None:
+def _delivery(path: Path) -> DeliveredFmu | None:
     """What the description of an FMU states; None where the file is no FMU any more: a result may be older than it."""
     try:
-        return Delivery.of(read_description(path, path.name))
+        return DeliveredFmu.of(read_description(path, path.name))
     except FmuLoadError:
         return None
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from cosim.baselines.baseline import Baseline
 from cosim.baselines.baseline_files import read_baseline
-from cosim.baselines.delivery import Delivery
+from cosim.baselines.delivery import DeliveredFmu
 from cosim.baselines.recipe import Recipe
 from cosim.components.description import read_description
 from cosim.errors import BaselineError, CosimError, ScenarioError
@@ -113,7 +113,7 @@ def _delivered_changes(path: Path, what: Any, folder: Path) -> list[str]:
         return []
     try:
         former = next((c.delivery for c in read_baseline(path).header.components if c.delivery), None)
-        return former.changes_to(Delivery.of(read_description(folder / what))) if former else []
+        return former.changes_to(DeliveredFmu.of(read_description(folder / what))) if former else []
     except CosimError:
         return []
 

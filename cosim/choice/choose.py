@@ -21,7 +21,7 @@ from cosim.runs.executors import make_executor
 from cosim.runs.job import Ended, Failure, Job
 from cosim.runs.keys import digest, table_content
 from cosim.simulation.scenario import Scenario
-from cosim.starter.starter import starter
+from cosim.starter.starter_file import starter
 
 SEEDS, HARDER = 4, 2.0
 """Disturbed runs that count, so that each error has both signs; and how much larger all is in the one that does not."""

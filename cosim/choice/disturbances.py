@@ -34,7 +34,7 @@ class Journey:
 
 
 @dataclass(frozen=True)
-class Fault:
+class OdometerFault:
     """A wheel that jams or skids.
 
     Args:
@@ -77,7 +77,7 @@ class Disturbance:
     noise: float = 0.0
     loss: float = 0.0
     slopes: Sequence[Slope] = ()
-    faults: Sequence[Fault] = ()
+    faults: Sequence[OdometerFault] = ()
 
     def cause(self, time: float) -> str:
         """What acts at an instant [s], in words.
@@ -133,18 +133,18 @@ def _slopes(rng: np.random.Generator, journey: Journey, size: float) -> list[Slo
     return [Slope(a, b - a, float(gradient)) for a, b, gradient in pairs if b > a]
 
 
-def _faults(rng: np.random.Generator, journey: Journey, size: float) -> list[Fault]:
+def _faults(rng: np.random.Generator, journey: Journey, size: float) -> list[OdometerFault]:
     """Jams while the train brakes, skids while it pulls, in the order of time and apart from each other."""
     moving = journey.speed > _MOVES
     pace = _accelerations(journey)
     jams = _instants(rng, journey.time[moving & (pace < _BRAKES)], every=15.0)
     skids = _instants(rng, journey.time[moving & (pace > _PULLS)], every=40.0)
-    found: list[Fault] = []
+    found: list[OdometerFault] = []
     for onset, kind in sorted([(t, -1.0) for t in jams] + [(t, 1.0) for t in skids]):
         depth = rng.uniform(0.3, 1.0) if kind < 0.0 else min(size * rng.uniform(0.1, 0.5), 1.0)
         length = size * rng.uniform(0.5, 3.0)
         if not found or onset > found[-1].onset + found[-1].length + _APART:
-            found.append(Fault(onset, float(length), float(depth), kind))
+            found.append(OdometerFault(onset, float(length), float(depth), kind))
     return found
 
 

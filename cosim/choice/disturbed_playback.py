@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from cosim.choice.candidates import BenchmarkCandidate
-from cosim.choice.disturbances import GRAVITY, Disturbance, Fault
+from cosim.choice.disturbances import GRAVITY, Disturbance, OdometerFault
 from cosim.choice.known_parameters import MASS, Known
 from cosim.choice.playback import ScenarioParts
 from cosim.run.component_models import make_system, values_in_use
@@ -17,7 +17,7 @@ _EFFORT, _WHEEL, _ODOMETER = "disturbed_effort", "disturbed_wheel", "disturbed_o
 
 
 @dataclass(frozen=True)
-class Channel:
+class DisturbedChannel:
     """What a signal passes between the recording and the observers.
 
     Args:
@@ -31,7 +31,7 @@ class Channel:
     connections: Sequence[Any]
 
 
-def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> list[Channel]:
+def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> list[DisturbedChannel]:
     """The disturbed channels: effort and odometer, as far as there are such signals and something is wrong with them.
 
     Args:
@@ -47,7 +47,7 @@ def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> li
     return found
 
 
-def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> Channel:
+def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> DisturbedChannel:
     """On a slope a train of the same motion needs ``m g i`` more."""
     slopes = disturbance.slopes
     stated = {
@@ -57,12 +57,12 @@ def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> Chann
     }
     options = {"fault_count": len(slopes), "unit": "N"}
     table = {"model": "signal_fault", "options": options, "parameters": stated}
-    return Channel(source, f"{_EFFORT}.reading", {_EFFORT: table}, [f"{source} -> {_EFFORT}.healthy"])
+    return DisturbedChannel(source, f"{_EFFORT}.reading", {_EFFORT: table}, [f"{source} -> {_EFFORT}.healthy"])
 
 
-def _odometer_channel(source: str, disturbance: Disturbance, period: float) -> Channel:
+def _odometer_channel(source: str, disturbance: Disturbance, period: float) -> DisturbedChannel:
     """A wheel that jams and skids, and an odometer that is worn and noisy."""
-    faults = disturbance.faults or (Fault(0.0, 0.0, 0.0, -1.0),)
+    faults = disturbance.faults or (OdometerFault(0.0, 0.0, 0.0, -1.0),)
     stated = {f"fault_{key}": [getattr(fault, key) for fault in faults] for key in ("onset", "length", "depth", "kind")}
     wheel = {"model": "wheel_fault", "options": {"cause": "stated", "fault_count": len(faults)}, "parameters": stated}
     odometer = {"model": "odometer", "parameters": {"sample_period": period, "noise_std": disturbance.noise}}
@@ -70,10 +70,10 @@ def _odometer_channel(source: str, disturbance: Disturbance, period: float) -> C
         {"from": source, "to": f"{_WHEEL}.speed", "factor": disturbance.wheel},
         f"{_WHEEL}.wheel_speed -> {_ODOMETER}.wheel_speed",
     ]
-    return Channel(source, f"{_ODOMETER}.reading", {_WHEEL: wheel, _ODOMETER: odometer}, lines)
+    return DisturbedChannel(source, f"{_ODOMETER}.reading", {_WHEEL: wheel, _ODOMETER: odometer}, lines)
 
 
-def disturbed(data: dict[str, Any], found: Sequence[Channel], disturbance: Disturbance) -> dict[str, Any]:
+def disturbed(data: dict[str, Any], found: Sequence[DisturbedChannel], disturbance: Disturbance) -> dict[str, Any]:
     """The tables of a scenario with the channels in it.
 
     Args:

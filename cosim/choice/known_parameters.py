@@ -17,7 +17,7 @@ from cosim.results.result import Result
 from cosim.run.component_models import make_declared, make_system, values_in_use
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.simulation.scenario import Scenario
-from cosim.starter.guess import in_si
+from cosim.starter.guessed_signal import in_si
 from cosim.starter.inspected_fmu import inspect_fmu
 from cosim.starter.starter_roles import plant_roles
 from cosim.starter.train_starter import DAVIS, usual_resistance

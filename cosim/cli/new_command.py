@@ -6,7 +6,7 @@ import argparse
 import shlex
 from pathlib import Path
 
-from cosim.starter.starter import write_starter
+from cosim.starter.starter_file import write_starter
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 

@@ -38,7 +38,7 @@ def written(records: Sequence[RegressionRecord], config: pytest.Config) -> list[
 
 
 def _page(records: Sequence[RegressionRecord], folder: Path, root: Path) -> str:
-    from cosim.report.live.live_page import LivePage, Rows, Section, Verdict  # noqa: PLC0415 - where a page is written
+    from cosim.report.live.live_page import LivePage, PageVerdict, Rows, Section  # noqa: PLC0415 - where a page is written
     from cosim.report.live.render import live_page  # noqa: PLC0415
     from fmus.tables.table import Table, name_column, text_column  # noqa: PLC0415
 
@@ -53,7 +53,7 @@ def _page(records: Sequence[RegressionRecord], folder: Path, root: Path) -> str:
     rows = [[_name(r, records), r.status, *(r.headlines.get(key, "") for key in HEADLINES)] for r in shown]
     links = [_address(root / r.files["html"], folder) if "html" in r.files else None for r in shown]
     table = Table("tests", columns, rows, bad={"differs", "missing", "error"})
-    sentence = Verdict(verdict(records), "good" if all(r.status in AS_BEFORE for r in records) else "bad")
+    sentence = PageVerdict(verdict(records), "good" if all(r.status in AS_BEFORE for r in records) else "bad")
     tests = Section("Tests", [Rows(table, links, plots=False)], is_open=True)
     return live_page(LivePage("FMU baselines", sentence, sections=[tests]))
 

@@ -36,7 +36,7 @@ _PLAYED_BACK = "the plant is a recording, which goes to any time and back"
 
 
 @dataclass(frozen=True)
-class Choice:
+class LocatingChoice:
     """The localisation method of a run.
 
     Args:
@@ -153,7 +153,7 @@ def choose_method(
     starts: Mapping[str, Any],
     start: float,
     step: float,
-) -> Choice:
+) -> LocatingChoice:
     """The localisation method: asked for, or the best that the probed plant allows.
 
     Args:
@@ -161,13 +161,13 @@ def choose_method(
         start: start of the run [s]. step: communication step [s].
     """
     if table.layout == "recorded":
-        return Choice("recorded", _AS_RECORDED)
+        return LocatingChoice("recorded", _AS_RECORDED)
     asked: Method | None = None if table.method == "auto" else table.method
     # a tolerance means a solver: it is examined
     if asked is not None and asked in _UNTOUCHED and component.tolerance is None:
-        return Choice(asked, _ASKED_FOR, error=_plant_error(table, asked, component, start))
+        return LocatingChoice(asked, _ASKED_FOR, error=_plant_error(table, asked, component, start))
     if component.kind == RECORDING:
-        return Choice("rollback", _PLAYED_BACK) if asked is None else Choice(asked, _ASKED_FOR)
+        return LocatingChoice("rollback", _PLAYED_BACK) if asked is None else LocatingChoice(asked, _ASKED_FOR)
     report = _known_probe(make, starts, start, step)
     chosen, reason = choose(report.honest_step, report.restores, table.clock)
     method, why = (chosen, reason) if asked is None else (asked, _ASKED_FOR)
@@ -178,7 +178,7 @@ def choose_method(
             f"balises.method = '{asked}' although the probe of '{component.name}' advises '{chosen}': {reason}. How "
             f"far the instants are off is unknown (time_bound = nan): {error.unknown}."
         )
-    return Choice(method, why, report, tuple(warnings), error)
+    return LocatingChoice(method, why, report, tuple(warnings), error)
 
 
 def _known_probe(make: Callable[[], Component], starts: Mapping[str, Any], start: float, step: float) -> ProbeReport:
@@ -229,7 +229,9 @@ def _why_unknown(method: Method, report: ProbeReport | None, position: str, tole
     return "" if seen else "the position is no output, and the probe looks at outputs only"
 
 
-def make_service(table: BalisesTable, layout: Layout, plan: Plan, roles: BaliseRoles, choice: Choice) -> BaliseService:
+def make_service(
+    table: BalisesTable, layout: Layout, plan: Plan, roles: BaliseRoles, choice: LocatingChoice
+) -> BaliseService:
     """Everything about balises for the master.
 
     Args:

@@ -17,7 +17,7 @@ from cosim.evaluation.error_table import error_table
 from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.evaluated import Evaluated, evaluated_table
-from cosim.report.live.live_page import Verdict
+from cosim.report.live.live_page import PageVerdict
 from cosim.report.page.run_verdict import observer_statuses, run_verdict
 from cosim.results.result import Result
 from cosim.results.results_folder import REPORT, remove_report, write_results
@@ -131,7 +131,7 @@ class Outcome(FirstScreen, Mapping[str, np.ndarray]):
         ]
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> PageVerdict:
         """What the run comes to, as ``text`` in a sentence or two, and as ``mood`` whether that is good."""
         statuses = observer_statuses(self.result, self.spec) if len(self.time) else []
         return run_verdict(self.result, self.spec, self.expectations, statuses)

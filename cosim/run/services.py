@@ -9,7 +9,7 @@ from cosim.balises.service import BaliseService
 from cosim.components.component import Component
 from cosim.coupling.plan import Plan
 from cosim.network.service import NetworkService
-from cosim.run.balise_service import Choice, choose_method, make_service
+from cosim.run.balise_service import LocatingChoice, choose_method, make_service
 from cosim.run.checked import Checked
 from cosim.run.remarks import Remarks
 from cosim.scenario.scenario_tables import BalisesTable
@@ -23,7 +23,7 @@ class Services:
         choice: how crossings are found, None without balises. balises, packets: None without balises, without network.
     """
 
-    choice: Choice | None
+    choice: LocatingChoice | None
     balises: BaliseService | None
     packets: NetworkService | None
 
@@ -47,7 +47,7 @@ def make_services(checked: Checked, plan: Plan, remarks: Remarks) -> Services:
     return Services(choice, balises, packets)
 
 
-def _choose(table: BalisesTable, checked: Checked, remarks: Remarks) -> Choice:
+def _choose(table: BalisesTable, checked: Checked, remarks: Remarks) -> LocatingChoice:
     """How crossings are found, with what speaks against it."""
     plant, loaded, axis = checked.balises.plant, checked.loaded, checked.task.axis
     make, starts = loaded.factories[plant], loaded.starts[plant]

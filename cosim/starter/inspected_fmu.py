@@ -15,7 +15,7 @@ from cosim.components.component import Component
 from cosim.components.description import read_description, runs_here
 from cosim.components.loading import describe_fmu
 from cosim.errors import FmuLoadError
-from cosim.starter.guess import GuessedSignal
+from cosim.starter.guessed_signal import GuessedSignal
 from fmus.fmi.elements import elements_of
 from fmus.fmi.types import NUMERIC_TYPES
 from plant_models.hybrid.units import UnitError

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from cosim.run.balise_service import BALISE_EVENT
-from cosim.starter.guess import Guess, Quantity, guess
+from cosim.starter.guessed_signal import Guess, Quantity, guess
 from cosim.starter.inspected_fmu import InspectedFmu
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import tomli_w
 
-from cosim.starter.guess import Guess, GuessedSignal
+from cosim.starter.guessed_signal import Guess, GuessedSignal
 from fmus.tables.table import pairs_table
 
 WIDTH = 118

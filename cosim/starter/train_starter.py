@@ -8,7 +8,7 @@ from typing import Any
 from cosim.run.component_models import make_declared
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import step_count
-from cosim.starter.guess import Guess, fits, in_si
+from cosim.starter.guessed_signal import Guess, fits, in_si
 from cosim.starter.inspected_fmu import InspectedFmu, number
 from cosim.starter.starter_roles import PlantRoles
 from cosim.starter.toml_lines import GuessedLink, guessed, one_line

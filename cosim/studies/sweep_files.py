@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cosim.errors import OutputError
 from cosim.report.live.render import live_page
 from cosim.report.page.page_files import page_bytes
-from cosim.studies.sweep_page import sweep_page
+from cosim.studies.live_sweep import sweep_page
 from fmus.tables.plain_data import jsonable
 
 if TYPE_CHECKING:

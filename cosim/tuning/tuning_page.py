@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cosim.report.live.live_page import Card, Curve, LivePage, Panel, Recording, Rows, Section, Verdict
+from cosim.report.live.live_page import Card, LivePage, PageCurve, PagePanel, PageRecording, PageVerdict, Rows, Section
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, Table, name_column
 
@@ -29,8 +29,8 @@ def tuning_page(tuning: Tuning) -> LivePage:
     recordings = [_search(s.evaluations, s.costs, f"search {s.seed}") for s in tuning.searches if len(s.costs)]
     ends = [x for recording in recordings for x in (recording.x[0], recording.x[-1])]
     if ends:
-        level = Curve("before", np.full(2, before), "1", look="wanted")
-        recordings.append(Recording("before", np.array([min(ends), max(ends)]), [level], "candidates", "1"))
+        level = PageCurve("before", np.full(2, before), "1", look="wanted")
+        recordings.append(PageRecording("before", np.array([min(ends), max(ends)]), [level], "candidates", "1"))
     is_positive = min([before, *(cost for s in tuning.searches for cost in s.costs)]) > 0.0
     return LivePage(
         title=f"Tuning by {tuning.method}",
@@ -38,7 +38,7 @@ def tuning_page(tuning: Tuning) -> LivePage:
         cards=_cards(tuning),
         lead=tuning.cost,
         recordings=recordings,
-        panels=[Panel(_CONVERGENCE, [_CONVERGENCE, "before"], log=is_positive)],
+        panels=[PagePanel(_CONVERGENCE, [_CONVERGENCE, "before"], log=is_positive)],
         sections=[
             Section("Warnings", [[*tuning.warnings]], mood="doubt"),
             Section("What was found", [*tuning.parts()]),
@@ -48,24 +48,24 @@ def tuning_page(tuning: Tuning) -> LivePage:
     )
 
 
-def _search(evaluations: Sequence[int], costs: Sequence[float], label: str) -> Recording:
+def _search(evaluations: Sequence[int], costs: Sequence[float], label: str) -> PageRecording:
     """The best cost so far over the candidates that were asked for."""
-    curve = Curve(_CONVERGENCE, np.asarray(costs, dtype=float), "1", held=True)
-    return Recording(label, np.asarray(evaluations, dtype=float), [curve], "candidates", "1")
+    curve = PageCurve(_CONVERGENCE, np.asarray(costs, dtype=float), "1", held=True)
+    return PageRecording(label, np.asarray(evaluations, dtype=float), [curve], "candidates", "1")
 
 
-def _verdict(tuning: Tuning) -> Verdict:
+def _verdict(tuning: Tuning) -> PageVerdict:
     """Whether seeds that no search has seen show a gain."""
     gain, kind = tuning.gain, "validation" if tuning.validated else "training"
     text = f"Cost {number(_mean(tuning, 0))} before, {number(_mean(tuning, 1))} after, with the {kind} seeds"
     text += f": a gain of {gain.text()}."
     if tuning.interrupted:
-        return Verdict(f"{text} The search was interrupted.", "doubt")
+        return PageVerdict(f"{text} The search was interrupted.", "doubt")
     if not tuning.validated:
-        return Verdict(f"{text} No seed validates it: what was learnt may be luck.", "doubt")
+        return PageVerdict(f"{text} No seed validates it: what was learnt may be luck.", "doubt")
     if not gain.low > 0.0:
-        return Verdict(f"{text} This does not show that the scenario has become better: it may be luck.", "doubt")
-    return Verdict(text, "good")
+        return PageVerdict(f"{text} This does not show that the scenario has become better: it may be luck.", "doubt")
+    return PageVerdict(text, "good")
 
 
 def _mean(tuning: Tuning, after: int) -> float:

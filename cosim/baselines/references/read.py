@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.baselines.baseline import Baseline, Header
 from cosim.baselines.baseline_files import summary_of
-from cosim.baselines.delivery import Delivery
+from cosim.baselines.delivery import DeliveredFmu
 from cosim.baselines.header_data import VERSION, header_from
 from cosim.baselines.model_identity import Identity
 from cosim.baselines.recipe import Recipe
@@ -180,7 +180,7 @@ def _header(reference: Reference, component: Component, table: Result, texts: Ma
         str(description.guid),
         path.name,
         parameters=parameters,
-        delivery=Delivery.of(description),
+        delivery=DeliveredFmu.of(description),
     )
     return Header(
         title=experiment.description or f"{experiment.name} of {path.name}",

@@ -4,17 +4,18 @@ made by `cosim.report.live.render`.
 Every page of the package is made here: that of a run, of FMUs coupled without an observer, of runs laid over each
 other, of a comparison, of a study, of a tuning. Another one is made likewise::
 
-    from cosim.report.live.live_page import Curve, LivePage, Mark, Panel, Recording, Rows, Section, Verdict
+    from cosim.report.live.live_page import LivePage, Mark, PageCurve, PagePanel, PageRecording, PageVerdict
+    from cosim.report.live.live_page import Rows, Section
     from cosim.report.live.render import live_page
     from cosim.report.page.page_files import write_page
 
     page = LivePage(
         title="Which observer for stopping_train",
-        verdict=Verdict("Use quasi_lpv_uio: inside SUBSET-041 with all seeds.", "good"),
+        verdict=PageVerdict("Use quasi_lpv_uio: inside SUBSET-041 with all seeds.", "good"),
         cards=[("Largest position error", "4.2 m", "of 12 m allowed", "good")],    # name, value, remark, mood
         finding="odometer_reset fails first: the wheels skid at 80 s, and the next balise is 900 m away.",
-        recordings=[Recording("nominal", time, [Curve("quasi_lpv_uio.speed", speed, "m/s")])],
-        panels=[Panel("Speed error", ["quasi_lpv_uio.speed"])],                    # names of curves, as recorded
+        recordings=[PageRecording("nominal", time, [PageCurve("quasi_lpv_uio.speed", speed, "m/s")])],
+        panels=[PagePanel("Speed error", ["quasi_lpv_uio.speed"])],                    # names of curves, as recorded
         marks=[Mark("balise", 12.5, "balise B7"), Mark("zone", 10.0, "wet rails", 20.0)],
         sections=[
             Section("Use", [Rows(table, links=["runs/a/report.html", None])], is_open=True),  # sorts, filters, plots
@@ -45,7 +46,7 @@ edge of what is allowed. It decides colour and width alone."""
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class PageVerdict:
     """The first sentence of a page, which must not mislead, and whether it is good."""
 
     text: str
@@ -53,7 +54,7 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class Curve:
+class PageCurve:
     """A curve of a recording.
 
     Args:
@@ -72,7 +73,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Recording:
+class PageRecording:
     """Curves over one abscissa: a run, the other run, a tube, a search.
 
     Args:
@@ -82,13 +83,13 @@ class Recording:
 
     label: str
     x: np.ndarray
-    curves: Sequence[Curve]
+    curves: Sequence[PageCurve]
     x_name: str = "time"
     x_unit: str = "s"
 
 
 @dataclass(frozen=True)
-class Panel:
+class PagePanel:
     """Curves drawn over each other.
 
     Args:
@@ -175,12 +176,12 @@ class LivePage:
     """
 
     title: str
-    verdict: Verdict
+    verdict: PageVerdict
     cards: Sequence[Card] = ()
     finding: str = ""
     lead: str = ""
-    recordings: Sequence[Recording] = ()
-    panels: Sequence[Panel] = ()
+    recordings: Sequence[PageRecording] = ()
+    panels: Sequence[PagePanel] = ()
     marks: Sequence[Mark] = ()
     settled: float | None = None
     sections: Sequence[Section] = ()

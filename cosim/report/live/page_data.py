@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.report.live.live_page import Curve, LivePage, Mark, Panel, Recording
+from cosim.report.live.live_page import LivePage, Mark, PageCurve, PagePanel, PageRecording
 from cosim.report.live.packed_column import INSTANTS, PackedColumn, pack
 from fmus.tables.plain_data import jsonable
 
@@ -82,7 +82,7 @@ class _Packer:
         for (recording, curve), column in zip(ordered, packed, strict=True):
             self.packed[id(recording), curve.name] = self._curve(curve, column)
 
-    def recording(self, recording: Recording) -> dict[str, Any]:
+    def recording(self, recording: PageRecording) -> dict[str, Any]:
         """A recording as plain data."""
         return {
             "label": recording.label,
@@ -90,7 +90,7 @@ class _Packer:
             "curves": [self.packed[id(recording), curve.name] for curve in recording.curves],
         }
 
-    def _curve(self, curve: Curve, packed: PackedColumn) -> dict[str, Any]:
+    def _curve(self, curve: PageCurve, packed: PackedColumn) -> dict[str, Any]:
         entry = {name: getattr(curve, name) for name in ("name", "unit", "held", "description", "look", "label")}
         entry |= {"ascends": _ascends(curve.values)}
         if packed.size > self.room:
@@ -134,7 +134,7 @@ def _ascends(values: np.ndarray) -> bool:
     return len(values) > 1 and bool(np.all(values[1:] >= values[:-1])) and -np.inf < values[0] < values[-1] < np.inf
 
 
-def _panel(panel: Panel) -> dict[str, Any]:
+def _panel(panel: PagePanel) -> dict[str, Any]:
     return {
         "title": panel.title,
         "curves": list(panel.curves),

@@ -14,7 +14,7 @@ from pathlib import Path
 from cosim.comparison.comparison import Comparison
 from cosim.comparison.comparison_text import VERDICTS, signals_table
 from cosim.comparison.verdict import ComparisonFinding, EventComparison, SignalComparison
-from cosim.report.live.live_page import Card, Folded, LivePage, Mood, Rows, Section, Verdict
+from cosim.report.live.live_page import Card, Folded, LivePage, Mood, PageVerdict, Rows, Section
 from cosim.report.live.render import live_page
 from cosim.report.page.comparison_curves import comparison_marks, comparison_panels, comparison_recordings
 from cosim.report.page.page_files import explained, page_bytes, write_file
@@ -106,7 +106,7 @@ def comparison_page(comparison: Comparison) -> LivePage:
     verdict = "Equal within tolerance" if comparison.equal else "Different"
     return LivePage(
         title=f"{comparison.result} against {comparison.reference}",
-        verdict=Verdict(f"{verdict}: {_verdict_text(comparison)}", _mood(comparison.equal)),
+        verdict=PageVerdict(f"{verdict}: {_verdict_text(comparison)}", _mood(comparison.equal)),
         cards=_cards(comparison),
         finding=next(iter([*comparison.causes, *worst]), ""),
         recordings=comparison_recordings(comparison),

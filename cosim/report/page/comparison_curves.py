@@ -10,41 +10,47 @@ import numpy as np
 
 from cosim.comparison.comparison import Comparison
 from cosim.comparison.verdict import Curves, SignalComparison
-from cosim.report.live.live_page import Curve, Mark, Panel, Recording
+from cosim.report.live.live_page import Mark, PageCurve, PagePanel, PageRecording
 
 TUBE, ERROR = "tolerance tube", "result minus reference"
 _DRAWN = 12  # panels of signals that differ; the others are in the list of signals
 _LOWER, _UPPER, _BELOW, _ABOVE, _OFF = "lower", "upper", "least allowed", "most allowed", "error"
 
 
-def comparison_recordings(comparison: Comparison) -> list[Recording]:
+def comparison_recordings(comparison: Comparison) -> list[PageRecording]:
     """Both sides of all signals with curves; of those that differ most tube and error, too.
 
     Args:
         comparison: what to show.
     """
-    sides: dict[tuple[str, bytes], tuple[np.ndarray, list[Curve]]] = {}
+    sides: dict[tuple[str, bytes], tuple[np.ndarray, list[PageCurve]]] = {}
     for signal in comparison.signals:
         if signal.curves is not None:
             for label, time, curve in _both(comparison, signal, signal.curves):
                 sides.setdefault((label, time.tobytes()), (time, []))[1].append(curve)
-    recordings = [Recording(label, time, curves) for (label, _), (time, curves) in sides.items()]
+    recordings = [PageRecording(label, time, curves) for (label, _), (time, curves) in sides.items()]
     for signal in _worst(comparison):
         if signal.curves is not None:
             recordings += _tube_and_error(signal, signal.curves)
     return [recording for recording in recordings if len(recording.x)]
 
 
-def _both(comparison: Comparison, signal: SignalComparison, curves: Curves) -> Iterator[tuple[str, np.ndarray, Curve]]:
-    yield comparison.reference, curves.reference_time, Curve(signal.name, curves.reference, signal.unit, look="true")
-    yield comparison.result, curves.result_time, Curve(signal.name, curves.result, signal.unit)
+def _both(
+    comparison: Comparison, signal: SignalComparison, curves: Curves
+) -> Iterator[tuple[str, np.ndarray, PageCurve]]:
+    yield (
+        comparison.reference,
+        curves.reference_time,
+        PageCurve(signal.name, curves.reference, signal.unit, look="true"),
+    )
+    yield comparison.result, curves.result_time, PageCurve(signal.name, curves.result, signal.unit)
 
 
 def _worst(comparison: Comparison) -> list[SignalComparison]:
     return [signal for signal in comparison.failed if signal.curves is not None][:_DRAWN]
 
 
-def _tube_and_error(signal: SignalComparison, curves: Curves) -> Iterator[Recording]:
+def _tube_and_error(signal: SignalComparison, curves: Curves) -> Iterator[PageRecording]:
     """The tube, whose pieces are parted by gaps; the error; the band that it may lie in."""
     name, unit = signal.name, signal.unit
     gap = np.isnan(curves.tube_time)
@@ -53,22 +59,22 @@ def _tube_and_error(signal: SignalComparison, curves: Curves) -> Iterator[Record
         lower, upper = (np.where(gap, np.nan, edge) for edge in (curves.lower, curves.upper))
         time = np.maximum.accumulate(np.where(gap, -np.inf, curves.tube_time)[places])
         edges = [(f"{name} {_LOWER}", lower), (f"{name} {_UPPER}", upper)]
-        yield Recording(
-            TUBE, time, [Curve(n, v, unit, look="allowed", label=n.removeprefix(f"{name} ")) for n, v in edges]
+        yield PageRecording(
+            TUBE, time, [PageCurve(n, v, unit, look="allowed", label=n.removeprefix(f"{name} ")) for n, v in edges]
         )
     if len(curves.error_time):
-        yield Recording(ERROR, curves.error_time, [Curve(f"{name} {_OFF}", curves.error, unit, label=ERROR)])
+        yield PageRecording(ERROR, curves.error_time, [PageCurve(f"{name} {_OFF}", curves.error, unit, label=ERROR)])
     ends = [t for t in (curves.reference_time, curves.result_time) if len(t)]
     if curves.allowed > 0.0 and ends:
         span = np.array([min(t[0] for t in ends), max(t[-1] for t in ends)])
         band = [(f"{name} {_BELOW}", -curves.allowed), (f"{name} {_ABOVE}", curves.allowed)]
         text = {n: n.removeprefix(f"{name} ") for n, _ in band}
-        yield Recording(
-            "allowed", span, [Curve(n, np.full(2, v), unit, look="allowed", label=text[n]) for n, v in band]
+        yield PageRecording(
+            "allowed", span, [PageCurve(n, np.full(2, v), unit, look="allowed", label=text[n]) for n, v in band]
         )
 
 
-def comparison_panels(comparison: Comparison) -> list[Panel]:
+def comparison_panels(comparison: Comparison) -> list[PagePanel]:
     """For each of the signals that differ most both sides in the tube, and the error in its band; those of the worst
     are shown at first. Without any, the first signals.
 
@@ -79,9 +85,9 @@ def comparison_panels(comparison: Comparison) -> list[Panel]:
     for place, signal in enumerate(_worst(comparison)):
         name = signal.name
         tube, band = [f"{name} {_LOWER}", f"{name} {_UPPER}"], [f"{name} {_BELOW}", f"{name} {_ABOVE}"]
-        panels.append(Panel(name, [*tube, name], bands=[(tube[0], tube[1])], is_shown=place == 0, is_whole=True))
+        panels.append(PagePanel(name, [*tube, name], bands=[(tube[0], tube[1])], is_shown=place == 0, is_whole=True))
         panels.append(
-            Panel(
+            PagePanel(
                 f"{name}: error",
                 [*band, f"{name} {_OFF}"],
                 bands=[(band[0], band[1])],
@@ -90,7 +96,7 @@ def comparison_panels(comparison: Comparison) -> list[Panel]:
             )
         )
     drawable = [signal.name for signal in comparison.signals if signal.curves is not None]
-    return panels or [Panel(name, [name]) for name in drawable[:2]]
+    return panels or [PagePanel(name, [name]) for name in drawable[:2]]
 
 
 def comparison_marks(comparison: Comparison) -> list[Mark]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.report.live.live_page import LivePage, Rows, Section, Verdict
+from cosim.report.live.live_page import LivePage, PageVerdict, Rows, Section
 from cosim.report.live.render import live_page
 from cosim.report.page.page_files import explained, page_bytes, write_files
 from cosim.report.page.run_curves import run_panels, run_recording
@@ -86,7 +86,7 @@ def benchmark_page(benchmark: BenchmarkScores, answer: Answer | None = None) -> 
     lead = f"{len(benchmark.scores)} observers, each alone beside the same recorded run of {benchmark.steps} steps."
     return LivePage(
         title=f"Observers on one run: {benchmark.spec.title}",
-        verdict=_verdict(benchmark) if answer is None else Verdict(answer.text, "" if answer.good else "bad"),
+        verdict=_verdict(benchmark) if answer is None else PageVerdict(answer.text, "" if answer.good else "bad"),
         lead=lead,
         recordings=[] if result is None else [run_recording(result, spec)],
         panels=[] if result is None else run_panels(result, spec),
@@ -104,17 +104,17 @@ def benchmark_page(benchmark: BenchmarkScores, answer: Answer | None = None) -> 
     )
 
 
-def _verdict(benchmark: BenchmarkScores) -> Verdict:
+def _verdict(benchmark: BenchmarkScores) -> PageVerdict:
     """Which observer has the smallest error, and how many have none."""
     known = [s for s in benchmark.scores if s.speed_rms is not None and isfinite(s.speed_rms)]
     if not known:
-        return Verdict("No observer has a speed error that can be compared.", "bad")
+        return PageVerdict("No observer has a speed error that can be compared.", "bad")
     best, count = min(known, key=lambda s: s.speed_rms or 0.0), len(benchmark.scores)
     text = (
         f"{best.label} has the smallest rms speed error of {count} observers in this run, {number(best.speed_rms)} m/s."
     )
     lost = count - len(known)
-    return Verdict(text + (f" {lost} diverged or have no numbers." if lost else ""), "doubt" if lost else "")
+    return PageVerdict(text + (f" {lost} diverged or have no numbers." if lost else ""), "doubt" if lost else "")
 
 
 def _certificates(benchmark: BenchmarkScores) -> Table:

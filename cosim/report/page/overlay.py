@@ -16,7 +16,7 @@ from cosim.evaluation.event_counts import count_events
 from cosim.evaluation.roles import phases
 from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_entry
-from cosim.report.live.live_page import Card, Folded, LivePage, Panel, Section, Verdict
+from cosim.report.live.live_page import Card, Folded, LivePage, PagePanel, PageVerdict, Section
 from cosim.report.live.render import live_page
 from cosim.report.overlay.changing_signals import changing_signals, largest_change
 from cosim.report.overlay.overlaid_runs import OverlayRun, make_runs
@@ -228,32 +228,32 @@ def overlay_page(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> Liv
     )
 
 
-def _panels(runs: Sequence[OverlayRun], signals: Sequence[str]) -> list[Panel]:
+def _panels(runs: Sequence[OverlayRun], signals: Sequence[str]) -> list[PagePanel]:
     """Those of all runs by their titles, and the signals that were asked for; where neither the signals that differ
     most.
     """
-    found: dict[str, Panel] = {}
+    found: dict[str, PagePanel] = {}
     for panel in (panel for run in runs for panel in run_panels(run.result, run.spec)):
         former = found.get(panel.title, panel)
         names = list(dict.fromkeys([*former.curves, *panel.curves]))
         found[panel.title] = replace(panel, curves=names)
     has_roles = any(run.spec.true_speed or run.spec.observers for run in runs)
     chosen = list(signals) or ([] if has_roles else changing_signals(runs, SIGNALS_SHOWN))
-    own = [Panel(name, [name]) for name in chosen]
+    own = [PagePanel(name, [name]) for name in chosen]
     others = found.values() if has_roles else [replace(panel, is_shown=not own) for panel in found.values()]
     return [*own, *others]
 
 
-def _verdict(runs: Sequence[OverlayRun], different: int, changes: Sequence[Card]) -> Verdict:
+def _verdict(runs: Sequence[OverlayRun], different: int, changes: Sequence[Card]) -> PageVerdict:
     """How many runs came to their end, what differs between them, and the largest change."""
     failed = [run.label for run in runs if run.result.failure is not None]
     if failed:
-        return Verdict(f"{', '.join(failed)} did not come to {'its' if len(failed) == 1 else 'their'} end.", "bad")
+        return PageVerdict(f"{', '.join(failed)} did not come to {'its' if len(failed) == 1 else 'their'} end.", "bad")
     settings = "no setting that is known differs" if not different else f"{different} settings differ"
     text = f"{len(runs)} complete runs; {'one setting differs' if different == 1 else settings}."
     text = text if len(runs) > 1 else "One complete run."
     found = " ".join(f"{name}: {size} {where}." for name, size, where, _ in changes)
-    return Verdict(f"{text} {found}".rstrip(), "doubt" if any(card[3] == "doubt" for card in changes) else "")
+    return PageVerdict(f"{text} {found}".rstrip(), "doubt" if any(card[3] == "doubt" for card in changes) else "")
 
 
 def _most_changed(runs: Sequence[OverlayRun]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.evaluation.roles import UNITS, Quantity, estimate, estimation_error, label, recorded
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.live.live_page import Curve, Look, Panel, Recording
+from cosim.report.live.live_page import Look, PageCurve, PagePanel, PageRecording
 from cosim.results.result import Result
 
 QUANTITIES: tuple[Quantity, ...] = ("speed", "position")
@@ -37,7 +37,7 @@ def error_panel(quantity: Quantity) -> str:
     return f"{quantity.capitalize()} error"
 
 
-def run_recording(result: Result, spec: ReportSpec, name: str = "run") -> Recording:
+def run_recording(result: Result, spec: ReportSpec, name: str = "run") -> PageRecording:
     """All recorded signals in their declared units, then the errors of the observers.
 
     Args:
@@ -53,8 +53,8 @@ def run_recording(result: Result, spec: ReportSpec, name: str = "run") -> Record
         )
         component, _, variable = column.partition(".")
         shown = f"{spec.labels[component]}: {variable}" if component in spec.labels else ""
-        curves.append(Curve(column, result[column], unit, held, text, looks.get(column, ""), shown))
-    return Recording(name, result.time, [*curves, *_errors(result, spec)])
+        curves.append(PageCurve(column, result[column], unit, held, text, looks.get(column, ""), shown))
+    return PageRecording(name, result.time, [*curves, *_errors(result, spec)])
 
 
 def _looks(spec: ReportSpec) -> Mapping[str | None, Look]:
@@ -64,17 +64,17 @@ def _looks(spec: ReportSpec) -> Mapping[str | None, Look]:
     return true | {spec.odometer: "measured", spec.speed_reference: "wanted"}
 
 
-def _errors(result: Result, spec: ReportSpec) -> Iterator[Curve]:
+def _errors(result: Result, spec: ReportSpec) -> Iterator[PageCurve]:
     for quantity in QUANTITIES:
         for observer in spec.observers:
             error = estimation_error(result, spec, observer, quantity)
             if error is not None:
                 text = f"Estimated minus true {quantity} of {label(spec, observer)}"
                 name = error_name(observer, quantity)
-                yield Curve(name, error, UNITS[quantity], False, text, "", label(spec, observer))
+                yield PageCurve(name, error, UNITS[quantity], False, text, "", label(spec, observer))
 
 
-def run_panels(result: Result, spec: ReportSpec) -> list[Panel]:
+def run_panels(result: Result, spec: ReportSpec) -> list[PagePanel]:
     """What is drawn first: speed and errors; slip, forces, positions and faults are offered. Without roles, the signals
     that change, by their units.
 
@@ -100,24 +100,24 @@ def _known(result: Result, names: Sequence[str | None]) -> list[str]:
     return [name for name in names if name is not None and recorded(result, name) is not None]
 
 
-def _speed(result: Result, spec: ReportSpec) -> Panel:
+def _speed(result: Result, spec: ReportSpec) -> PagePanel:
     """The truth first and the estimates last: what is drawn later lies above."""
     names = [spec.true_speed, spec.odometer, spec.speed_reference, *(f"{train}.speed" for train in spec.other_trains)]
     estimates = [f"{o}.speed" for o in spec.observers if estimate(result, o, "speed") is not None]
-    return Panel("Speed", list(dict.fromkeys([*_known(result, names), *estimates])))
+    return PagePanel("Speed", list(dict.fromkeys([*_known(result, names), *estimates])))
 
 
-def _error_panel(result: Result, spec: ReportSpec, quantity: Quantity) -> Panel:
+def _error_panel(result: Result, spec: ReportSpec, quantity: Quantity) -> PagePanel:
     names = [error_name(o, quantity) for o in spec.observers if estimation_error(result, spec, o, quantity) is not None]
-    return Panel(error_panel(quantity), names)
+    return PagePanel(error_panel(quantity), names)
 
 
-def _role_panel(title: str, result: Result, spec: ReportSpec, true: str | None, output: str) -> Panel:
+def _role_panel(title: str, result: Result, spec: ReportSpec, true: str | None, output: str) -> PagePanel:
     estimates = [f"{o}.{output}" for o in spec.observers if estimate(result, o, output) is not None]
-    return Panel(title, [*_known(result, [true]), *estimates], is_shown=False)
+    return PagePanel(title, [*_known(result, [true]), *estimates], is_shown=False)
 
 
-def changing_panels(results: Sequence[Result]) -> list[Panel]:
+def changing_panels(results: Sequence[Result]) -> list[PagePanel]:
     """Signals that change, by unit, those units first that most of them have.
 
     Args:
@@ -138,6 +138,6 @@ def changing_panels(results: Sequence[Result]) -> list[Panel]:
         ((u, names) for u, names in by_unit.items() if names), key=lambda entry: (entry[0] == "1", -len(entry[1]))
     )
     return [
-        Panel(f"Signals [{unit}]", names[:_SHOWN_CURVES], is_shown=i < _SHOWN_UNITS)
+        PagePanel(f"Signals [{unit}]", names[:_SHOWN_CURVES], is_shown=i < _SHOWN_UNITS)
         for i, (unit, names) in enumerate(ordered)
     ]

@@ -20,7 +20,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.evaluation.summary_entries import mapping_entry, number_entry
 from cosim.expectations.evaluated import Evaluated
 from cosim.report.live.first_sentence import first_sentence
-from cosim.report.live.live_page import Mark, Verdict
+from cosim.report.live.live_page import Mark, PageVerdict
 from cosim.report.page.run_curves import QUANTITIES
 from cosim.results.result import Result
 from fmus.tables.numbers import number
@@ -87,7 +87,7 @@ def _within(gaps: GapErrors, observer: str) -> float:
 
 def run_verdict(
     result: Result, spec: ReportSpec, evaluated: Sequence[Evaluated], statuses: Sequence[ObserverStatus]
-) -> Verdict:
+) -> PageVerdict:
     """What a run comes to, in a sentence or two.
 
     Args:
@@ -97,19 +97,19 @@ def run_verdict(
     if result.failure is not None:
         stop = number_entry(result.summary, "stop")
         end = f"at {reached} s" + (f" of {number(stop)} s" if stop is not None else "")
-        return Verdict(f"The run ended early, {end}: {first_sentence(result.failure)[0]}", "bad")
+        return PageVerdict(f"The run ended early, {end}: {first_sentence(result.failure)[0]}", "bad")
     unmet = [one for one in evaluated if not one.passed]
     speed = recorded(result, spec.true_speed)
     moves = speed is None or not len(speed) or bool(np.any(~(np.abs(speed) <= 0.01)))
     if not moves:
         text = f"The train never moves up to {reached} s: this run says nothing of its observers."
-        return Verdict(_with_unmet(unmet, evaluated, text), "bad" if unmet else "doubt")
+        return PageVerdict(_with_unmet(unmet, evaluated, text), "bad" if unmet else "doubt")
     text, good = _of_observers(spec, statuses) if statuses else (_without_observers(result, reached), True)
     mood = "bad" if unmet or (statuses and all(s.fails for s in statuses)) else "good" if good else "doubt"
     others = len(all_warnings(result, spec)) - sum(s.fails for s in statuses)
     if others > 0 and mood == "good":
         mood, text = "doubt", f"{text} {others} {'warning' if others == 1 else 'warnings'}."
-    return Verdict(_with_unmet(unmet, evaluated, text), mood)  # type: ignore[arg-type]  # one of the moods
+    return PageVerdict(_with_unmet(unmet, evaluated, text), mood)  # type: ignore[arg-type]  # one of the moods
 
 
 def _with_unmet(unmet: Sequence[Evaluated], evaluated: Sequence[Evaluated], text: str) -> str:

@@ -14,7 +14,7 @@ from test_fmus.build import linear_fmu
 from cosim import Scenario
 from cosim.baselines import check, read_baseline, write_baseline
 from cosim.baselines.call import Call
-from cosim.baselines.delivery import DeliveredVariable, Delivery
+from cosim.baselines.delivery import DeliveredFmu, DeliveredVariable
 from cosim.baselines.header_data import header_data
 from cosim.comparison.comparison_text import comparison_text
 from cosim.errors import BaselineError
@@ -29,7 +29,7 @@ VARIABLES = st.builds(
     st.one_of(st.just(""), WORDS),
 )
 DELIVERIES = st.builds(
-    Delivery,
+    DeliveredFmu,
     WORDS,
     WORDS,
     st.dictionaries(st.sampled_from(["startTime", "stopTime", "stepSize"]), st.floats(0.0, 9.0).map(repr)),
@@ -39,21 +39,21 @@ DELIVERIES = st.builds(
 )
 MASS = DeliveredVariable("m_ges", "parameter", "90", "t")
 SPEED = DeliveredVariable("v", "output", "", "m/s")
-FIRST = Delivery("Modeller R2021b", "2021-12-01", {"stepSize": "0.01"}, {"m_ges": MASS, "v": SPEED})
+FIRST = DeliveredFmu("Modeller R2021b", "2021-12-01", {"stepSize": "0.01"}, {"m_ges": MASS, "v": SPEED})
 
 
 @given(DELIVERIES)
-def test_what_is_written_is_read_again_and_is_no_change(delivery: Delivery) -> None:
-    again = Delivery.from_data(json.loads(json.dumps(delivery.to_data())))
+def test_what_is_written_is_read_again_and_is_no_change(delivery: DeliveredFmu) -> None:
+    again = DeliveredFmu.from_data(json.loads(json.dumps(delivery.to_data())))
     assert again == delivery
     assert delivery.changes_to(again) == []
 
 
-def changed(name: str, **values: str) -> Delivery:
+def changed(name: str, **values: str) -> DeliveredFmu:
     return replace(FIRST, variables={**FIRST.variables, name: replace(FIRST.variables[name], **values)})
 
 
-def without(name: str) -> Delivery:
+def without(name: str) -> DeliveredFmu:
     return replace(FIRST, variables={n: v for n, v in FIRST.variables.items() if n != name})
 
 
@@ -76,7 +76,7 @@ def without(name: str) -> Delivery:
         (changed("m_ges", start="90.00000001"), ["m_ges start 90 -> 90.00000001 t"]),
     ],
 )
-def test_each_change_is_named_with_both_values(now: Delivery, says: list[str]) -> None:
+def test_each_change_is_named_with_both_values(now: DeliveredFmu, says: list[str]) -> None:
     assert FIRST.changes_to(now) == says
 
 

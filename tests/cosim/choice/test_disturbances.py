@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.choice.disturbances import Disturbance, Fault, Journey, drawn
+from cosim.choice.disturbances import Disturbance, Journey, OdometerFault, drawn
 
 
 def journey(top: float, rate: float, cruise: float) -> Journey:
@@ -64,7 +64,7 @@ def test_the_same_seed_gives_the_same_and_another_number_another(way: Journey, s
 
 
 def test_what_acted_is_named_by_the_fault_before_it() -> None:
-    found = Disturbance(faults=(Fault(10.0, 2.0, 1.0, -1.0), Fault(30.0, 1.0, 0.3, 1.0)))
+    found = Disturbance(faults=(OdometerFault(10.0, 2.0, 1.0, -1.0), OdometerFault(30.0, 1.0, 0.3, 1.0)))
     assert found.cause(13.0) == "after a wheel that jams at 10 s"
     assert found.cause(31.0) == "after a wheel that skids at 30 s"
     assert found.cause(25.0) == ""

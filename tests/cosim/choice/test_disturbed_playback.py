@@ -12,7 +12,7 @@ from small_scenarios import small
 
 from cosim.choice.benchmark import benchmark_observers
 from cosim.choice.candidates import find_candidates
-from cosim.choice.disturbances import GRAVITY, Disturbance, Fault, Journey, Slope
+from cosim.choice.disturbances import GRAVITY, Disturbance, Journey, OdometerFault, Slope
 from cosim.choice.disturbed_playback import believing
 from cosim.choice.known_parameters import derived_parameters, stated_parameters
 from cosim.choice.playback import find_parts
@@ -33,7 +33,9 @@ def scores(wrong: Disturbance, observers: Any = HEARD) -> dict[str, Any]:
 def test_a_channel_in_which_nothing_is_wrong_changes_no_bit() -> None:
     """The noise is too small to change a reading, and yet all blocks stand there."""
     nothing = scores(Disturbance())
-    there = scores(Disturbance(noise=1e-300, faults=(Fault(0.1, 0.1, 0.0, 1.0),), slopes=(Slope(0.0, 0.5, 0.0),)))
+    there = scores(
+        Disturbance(noise=1e-300, faults=(OdometerFault(0.1, 0.1, 0.0, 1.0),), slopes=(Slope(0.0, 0.5, 0.0),))
+    )
     for name, outcome in nothing.items():
         for signal in ("position", "speed"):
             times = np.unique(outcome.result.time)
@@ -44,7 +46,7 @@ def test_a_channel_in_which_nothing_is_wrong_changes_no_bit() -> None:
 def test_a_jam_and_wear_are_in_the_way_of_the_odometer() -> None:
     """5 m in half a second at 10 m/s: 1 % more, and without the tenth in which the wheel stands."""
     at_balises = small().balises(positions=[1e3])
-    wrong = Disturbance(wheel=1.01, faults=(Fault(0.2, 0.1, 1.0, -1.0),))
+    wrong = Disturbance(wheel=1.01, faults=(OdometerFault(0.2, 0.1, 1.0, -1.0),))
     right, jammed = (
         benchmark_observers(at_balises, ["odometer_reset"], disturb=always(found)).outcomes["odometer_reset"]
         for found in (Disturbance(), wrong)

@@ -48,7 +48,7 @@ def test_numpy_says_that_it_drops_the_units(tmp_path: Path, capsys: pytest.Captu
     [
         ("a.h5", "a.xlsx", [], "the format follows from the ending"),
         ("a.h5", "a.h5", [], "is the source itself"),
-        ("b.h5", "a.csv", [], "did you mean 'a.h5'"),
+        ("b.h5", "a.csv", [], "in that folder there is: a.h5"),
         ("a.h5", "none/a.csv", [], "cannot be written: No such file or directory"),
         ("a.h5", "a.csv", ["--signals", "trian.*"], "No signal 'trian.*' in the result"),
     ],

@@ -14,7 +14,7 @@ import pytest
 import plant_models
 from cosim.cli import main
 from cosim.simulation.scenario import Scenario
-from cosim.starter.starter import write_starter
+from cosim.starter.starter_file import write_starter
 from fmu_observer import OBSERVERS
 from fmus import cached_fmu
 from fmus.cli import main as fmus

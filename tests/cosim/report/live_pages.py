@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.report.live.live_page import Curve, LivePage, Mark, Panel, Recording, Rows, Section, Verdict
+from cosim.report.live.live_page import LivePage, Mark, PageCurve, PagePanel, PageRecording, PageVerdict, Rows, Section
 from cosim.report.live.render import live_page
 from fmus.tables.table import Column, Table, name_column
 
@@ -15,18 +15,18 @@ SPIKE = 12_345
 """Row of a value that no other is near."""
 
 
-def curves(scale: float = 1.0) -> list[Curve]:
+def curves(scale: float = 1.0) -> list[PageCurve]:
     """A wave with a spike, a ramp, a held signal with a gap, a small error."""
     wave = np.sin(TIME / 3.0)
     wave[SPIKE] = 7.0
     held = np.floor(TIME / 5.0)
     held[4000:6000] = np.nan
     return [
-        Curve("train.speed", scale * wave, "m/s", description="How fast it is", look="true"),
-        Curve("train.position", scale * TIME, "m"),
-        Curve("driver.level", held, "1", held=True),
-        Curve("observer.speed", scale * wave + 1e-3, "m/s"),
-        Curve("observer.force", 1e3 * wave, "N"),
+        PageCurve("train.speed", scale * wave, "m/s", description="How fast it is", look="true"),
+        PageCurve("train.position", scale * TIME, "m"),
+        PageCurve("driver.level", held, "1", held=True),
+        PageCurve("observer.speed", scale * wave + 1e-3, "m/s"),
+        PageCurve("observer.force", 1e3 * wave, "N"),
     ]
 
 
@@ -38,12 +38,12 @@ def explored_page(**more: object) -> LivePage:
     )
     values: dict[str, object] = {
         "title": "A page",
-        "verdict": Verdict("It is good.", "good"),
-        "recordings": [Recording("run", TIME, curves())],
+        "verdict": PageVerdict("It is good.", "good"),
+        "recordings": [PageRecording("run", TIME, curves())],
         "panels": [
-            Panel("Speed", ["train.speed", "observer.speed"]),
-            Panel("Way", ["train.position"]),
-            Panel("Force", ["observer.force"], is_shown=False),
+            PagePanel("Speed", ["train.speed", "observer.speed"]),
+            PagePanel("Way", ["train.position"]),
+            PagePanel("Force", ["observer.force"], is_shown=False),
         ],
         "marks": [
             Mark("worst", float(TIME[SPIKE]), "the spike", None, "Speed", 7.0),
@@ -58,11 +58,11 @@ def explored_page(**more: object) -> LivePage:
 
 def overlaid_page() -> LivePage:
     """Two runs of which one is twice the other; a name has two units."""
-    other = [*curves(2.0)[:-1], Curve("observer.force", TIME, "kN")]
+    other = [*curves(2.0)[:-1], PageCurve("observer.force", TIME, "kN")]
     short = slice(0, 15_000, 2)
-    cut = [Curve(c.name, c.values[short], c.unit, c.held, c.description, c.look) for c in other]
-    recordings = [Recording("first", TIME, curves()), Recording("second", TIME[short], cut)]
-    panels = [Panel("Way", ["train.position"]), Panel("Force", ["observer.force"])]
+    cut = [PageCurve(c.name, c.values[short], c.unit, c.held, c.description, c.look) for c in other]
+    recordings = [PageRecording("first", TIME, curves()), PageRecording("second", TIME[short], cut)]
+    panels = [PagePanel("Way", ["train.position"]), PagePanel("Force", ["observer.force"])]
     return explored_page(recordings=recordings, marks=(), panels=panels)
 
 

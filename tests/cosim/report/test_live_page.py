@@ -13,7 +13,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from live_pages import explored_page, overlaid_page
 
-from cosim.report.live.live_page import Curve, Folded, LivePage, Mark, Panel, Recording, Rows, Section, Verdict
+from cosim.report.live.live_page import (
+    Folded,
+    LivePage,
+    Mark,
+    PageCurve,
+    PagePanel,
+    PageRecording,
+    PageVerdict,
+    Rows,
+    Section,
+)
 from cosim.report.live.render import live_page
 from fmus.tables.table import Column, Table, name_column
 
@@ -47,15 +57,15 @@ def page_with(text: str) -> LivePage:
     table = Table(
         "t", [name_column("name", text, text), Column("x", text, text, text)], [[text.replace("\n", " "), 1.0]]
     )  # a remark stands behind a line break
-    curve = Curve(f"{text}.x", np.zeros(3), text, description=text, label=text)
+    curve = PageCurve(f"{text}.x", np.zeros(3), text, description=text, label=text)
     return LivePage(
         text,
-        Verdict(text, "bad"),
+        PageVerdict(text, "bad"),
         [(text, text, text, "")],
         text,
         text,
-        [Recording(text, np.arange(3.0), [curve], text, text)],
-        [Panel(text, [f"{text}.x"])],
+        [PageRecording(text, np.arange(3.0), [curve], text, text)],
+        [PagePanel(text, [f"{text}.x"])],
         [Mark(text, 1.0, text, None, text)],
         None,
         [Section(text, [text, [text], Folded(text, [text, table]), Rows(table, [None])])],
@@ -91,14 +101,14 @@ def test_a_page_says_what_it_cannot_show_without_javascript() -> None:
     "recordings",
     [
         [],
-        [Recording("none", np.array([]), [])],
-        [Recording("empty", np.array([]), [Curve("a.b", np.array([]))])],
-        [Recording("one", np.array([1.0]), [Curve("a.b", np.array([np.nan]))])],
-        [Recording("wild", np.array([0.0, 0.0, 1.0]), [Curve("a.b", np.array([np.inf, -np.inf, 1e308]))])],
+        [PageRecording("none", np.array([]), [])],
+        [PageRecording("empty", np.array([]), [PageCurve("a.b", np.array([]))])],
+        [PageRecording("one", np.array([1.0]), [PageCurve("a.b", np.array([np.nan]))])],
+        [PageRecording("wild", np.array([0.0, 0.0, 1.0]), [PageCurve("a.b", np.array([np.inf, -np.inf, 1e308]))])],
     ],
 )
-def test_pages_of_hardly_anything(recordings: list[Recording]) -> None:
-    live_page(LivePage("t", Verdict("v"), recordings=recordings, panels=[Panel("p", ["a.b", "no.such"])]))
+def test_pages_of_hardly_anything(recordings: list[PageRecording]) -> None:
+    live_page(LivePage("t", PageVerdict("v"), recordings=recordings, panels=[PagePanel("p", ["a.b", "no.such"])]))
 
 
 def test_one_name_with_two_units_keeps_both() -> None:

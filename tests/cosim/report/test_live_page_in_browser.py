@@ -14,7 +14,7 @@ from browser import DESKTOP, PHONE, check_page
 from live_pages import SPIKE, TIME, explored_page, overlaid_page, written
 from playwright.sync_api import Page
 
-from cosim.report.live.live_page import Curve, LivePage, Panel, Recording, Verdict
+from cosim.report.live.live_page import LivePage, PageCurve, PagePanel, PageRecording, PageVerdict
 
 pytestmark = pytest.mark.browser
 EXPLORER = "document.getElementById('explorer').explorer"
@@ -65,9 +65,9 @@ def test_what_is_decoded_is_what_was_packed(tmp_path: Path) -> None:
     columns = {"a.odd": odd, "a.line": np.linspace(-5.0, 5.0, 8), "a.big": 10.0 ** np.arange(8) ** 2}
     made = LivePage(
         "t",
-        Verdict("v"),
-        recordings=[Recording("r", np.arange(8.0), [Curve(n, v) for n, v in columns.items()])],
-        panels=[Panel("p", list(columns))],
+        PageVerdict("v"),
+        recordings=[PageRecording("r", np.arange(8.0), [PageCurve(n, v) for n, v in columns.items()])],
+        panels=[PagePanel("p", list(columns))],
     )
     with opened(made, tmp_path) as page:
         for name, expected in columns.items():
@@ -205,7 +205,10 @@ def test_long_runs_open_with_their_extremes_and_are_whole_soon(tmp_path: Path) -
     wave = np.sin(time / 50.0)
     wave[123_456] = 9.0
     made = LivePage(
-        "t", Verdict("v"), recordings=[Recording("r", time, [Curve("a.b", wave)])], panels=[Panel("p", ["a.b"])]
+        "t",
+        PageVerdict("v"),
+        recordings=[PageRecording("r", time, [PageCurve("a.b", wave)])],
+        panels=[PagePanel("p", ["a.b"])],
     )
     with opened(made, tmp_path) as page:
         page.wait_for_function("document.getElementById('explorer').dataset.refined")

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.report.live.live_page import Curve, LivePage, Panel, Recording, Verdict
+from cosim.report.live.live_page import LivePage, PageCurve, PagePanel, PageRecording, PageVerdict
 from cosim.report.live.packed_column import INSTANTS, PackedColumn, pack
 from cosim.report.live.page_data import extreme_rows, page_data
 from cosim.report.live.render import live_page
@@ -113,20 +113,22 @@ def test_what_finds_no_room_is_reduced_and_named(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(module, "ROOM", 40_000)
     monkeypatch.setattr(module, "ROOM_A_ROW", 1)
     rng = np.random.default_rng(0)
-    curves = [Curve(f"a.{i}", rng.standard_normal(5000)) for i in range(6)]
-    recordings, panels = [Recording("r", np.arange(5000.0), curves)], [Panel("p", ["a.4"])]
-    found = page_data(LivePage("t", Verdict("v"), recordings=recordings, panels=panels))
+    curves = [PageCurve(f"a.{i}", rng.standard_normal(5000)) for i in range(6)]
+    recordings, panels = [PageRecording("r", np.arange(5000.0), curves)], [PagePanel("p", ["a.4"])]
+    found = page_data(LivePage("t", PageVerdict("v"), recordings=recordings, panels=panels))
     assert "a.4" not in found.reduced  # a panel shows it
     assert found.reduced
     assert sum(map(len, found.blocks)) < 60_000
     monkeypatch.undo()
-    assert not page_data(LivePage("t", Verdict("v"), recordings=recordings)).reduced
+    assert not page_data(LivePage("t", PageVerdict("v"), recordings=recordings)).reduced
 
 
 def test_the_page_of_a_hundred_thousand_rows_is_small() -> None:
     """40 signals, half of them noise."""
     rng, time = np.random.default_rng(0), np.arange(100_000) * 0.01
     waves = [np.sin(time / (3.0 + i)) + (i % 2) * 0.05 * rng.standard_normal(len(time)) for i in range(40)]
-    curves = [Curve(f"a.{i}", wave, "m/s") for i, wave in enumerate(waves)]
-    page = LivePage("t", Verdict("v"), recordings=[Recording("r", time, curves)], panels=[Panel("p", ["a.1", "a.2"])])
+    curves = [PageCurve(f"a.{i}", wave, "m/s") for i, wave in enumerate(waves)]
+    page = LivePage(
+        "t", PageVerdict("v"), recordings=[PageRecording("r", time, curves)], panels=[PagePanel("p", ["a.1", "a.2"])]
+    )
     assert len(live_page(page)) < 3_000_000

@@ -16,7 +16,7 @@ from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
 from cosim.components.start_values import declared_start, start_values
 from cosim.errors import CosimError, CouplingError
-from cosim.starter.starter import write_starter
+from cosim.starter.starter_file import write_starter
 
 WRITTEN: tuple[Any, ...] = (True, 0, 1, 2, -1, 3.0, 2.5, 127, 300, 2**31, 2**64 - 1, -(2**63), 1e300)
 WRITTEN += ("busy", "calmm", "00ff", "0f0", "", "3", "Zürich")

@@ -18,9 +18,9 @@ from cosim.master.master import Master
 from cosim.results.results_folder import read_results
 from cosim.run.outcome import Outcome
 from cosim.runs.journal import JOURNAL, read_lines
+from cosim.studies.live_sweep import sweep_page
 from cosim.studies.sampling_plans import uniform
 from cosim.studies.seed_runs import seed_study
-from cosim.studies.sweep_page import sweep_page
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun, SweepRuns
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from cosim.report.live.live_page import Curve, LivePage, Panel, Recording, Rows, Section, Verdict
+from cosim.report.live.live_page import LivePage, PageCurve, PagePanel, PageRecording, PageVerdict, Rows, Section
 from cosim.results.results_folder import REPORT
 from cosim.studies.measures import setting_text
 from cosim.studies.setting_units import setting_unit
@@ -44,7 +44,7 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
         finding=_finding(result),
         lead=about + more,
         recordings=recordings,
-        panels=[Panel(name, [name], is_shown=place < _SHOWN) for place, name in enumerate(names)],
+        panels=[PagePanel(name, [name], is_shown=place < _SHOWN) for place, name in enumerate(names)],
         sections=[
             Section("Runs", [Rows(_table(result), [_link(run, directory) for run in result.runs])], is_open=True),
             Section("What failed", [result.troubles()], mood="bad"),
@@ -87,7 +87,7 @@ def _measure(result: SweepRuns) -> Column | None:
     return next(iter(result.columns), None)
 
 
-def _verdict(result: SweepRuns) -> Verdict:
+def _verdict(result: SweepRuns) -> PageVerdict:
     count, failed = len(result), len(result.failed)
     text = f"{count - failed} of {count} runs came to their end."
     column = _measure(result)
@@ -99,7 +99,7 @@ def _verdict(result: SweepRuns) -> Verdict:
         text += f" {column.heading}: {middle}{unit} in the median, {low} to {high}{unit}."
     if diverged:
         text += f" In {diverged} it is no finite number."
-    return Verdict(text, "bad" if failed == count else "doubt" if failed or diverged else "good")
+    return PageVerdict(text, "bad" if failed == count else "doubt" if failed or diverged else "good")
 
 
 def _finding(result: SweepRuns) -> str:
@@ -130,7 +130,7 @@ def _correlations(result: SweepRuns, measure: str) -> list[tuple[str, float]]:
     return found
 
 
-def _recordings(result: SweepRuns) -> list[Recording]:
+def _recordings(result: SweepRuns) -> list[PageRecording]:
     """The measures over the first number that was varied, a line for each combination of the others; none where these
     are too many.
     """
@@ -148,11 +148,11 @@ def _recordings(result: SweepRuns) -> list[Recording]:
     return [_line(result, against, label, runs) for label, runs in groups.items()]
 
 
-def _line(result: SweepRuns, against: str, label: str, runs: Sequence[SweepRun]) -> Recording:
+def _line(result: SweepRuns, against: str, label: str, runs: Sequence[SweepRun]) -> PageRecording:
     ordered = sorted(runs, key=lambda run: float(run.settings[against]))
     curves = []
     for column in result.columns:
         values = np.array([run.measures.get(column.key, np.nan) for run in ordered])
-        curves.append(Curve(column.heading, column.factor * values, column.unit or "1"))
+        curves.append(PageCurve(column.heading, column.factor * values, column.unit or "1"))
     x = np.array([float(run.settings[against]) for run in ordered])
-    return Recording(label, x, curves, against, setting_unit(result, against) or "1")
+    return PageRecording(label, x, curves, against, setting_unit(result, against) or "1")

@@ -14,7 +14,7 @@ from cosim.errors import CosimError, OutputError, ScenarioError, nearest
 from cosim.scenario.paths import move_file, relative
 from cosim.scenario.schema import step_count
 from cosim.simulation.scenario import Scenario
-from cosim.starter.guess import Guess
+from cosim.starter.guessed_signal import Guess
 from cosim.starter.inspected_fmu import InspectedFmu, inspect_fmu, number
 from cosim.starter.starter_roles import ObserverRoles, PlantRoles, is_observer, observer_roles, plant_roles
 from cosim.starter.toml_lines import LISTED, GuessedLink, comment, entry, guessed, inline, listing, one_line

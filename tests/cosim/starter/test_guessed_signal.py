@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim.starter.guess import GuessedSignal, Quantity, _words_of, guess
+from cosim.starter.guessed_signal import GuessedSignal, Quantity, _words_of, guess
 from plant_models.hybrid.units import parse_unit
 
 

@@ -17,7 +17,7 @@ import fmu_observer
 import plant_models
 from cosim import Scenario
 from cosim.errors import FmuLoadError, OutputError, ScenarioError
-from cosim.starter.starter import starter, write_starter
+from cosim.starter.starter_file import starter, write_starter
 from fmus import cached_fmu
 
 TIME = Variable("time", 0, "independent")
