@@ -53,7 +53,7 @@ def test_several_over_each_other(runs: Path, tmp_path: Path, monkeypatch: pytest
         "A run: 2 runs",
         "10 ms is what the others are compared with: 50 ms.",
         "odometer.sample_period",
-        "driver.effort.",
+        '"title":"driver.effort"',
     ):
         assert words in text
 
