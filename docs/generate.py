@@ -66,7 +66,7 @@ def run_requirements() -> str:
     kept = [text for text in project["dependencies"] if text.partition(">")[0] not in (*LEFT_OUT, "fmpy")]
     kept += [text for text in project["optional-dependencies"]["test"] if text.startswith("pytest>")]
     lines = [
-        "# What running, comparing and testing FMUs needs: docs/regression_tests.md. Written by docs/generate.py.",
+        "# For running, comparing and testing FMUs: docs/guide/regression_tests.md. Written by docs/generate.py.",
         "# Behind it: pip install --no-deps 'fmpy>=0.3.32' fmu-observer",
         *sorted([*kept, *OF_FMPY]),
     ]

@@ -12,4 +12,4 @@ RECOMMENDED: Mapping[str, str] = {
     "balise_odometer_ekf": "effort, an odometer and balises; it says how uncertain position and speed are",
     "takagi_sugeno_cdo": "effort, an odometer and balises; preset long_gaps is stable at any gap",
 }
-"""By name, in the order in which they are tried: what one has who takes it. See docs/choosing_an_observer.md."""
+"""By name, in the order in which they are tried: what one has who takes it. See docs/guide/choosing_an_observer.md."""

@@ -1,4 +1,4 @@
-"""What a regression test reports of a changed delivery, for docs/regression_tests.md.
+"""What a regression test reports of a changed delivery, for docs/guide/regression_tests.md.
 
     python docs/studies/changed_deliveries.py
 
@@ -26,7 +26,7 @@ from cosim.comparison.comparison_text import comparison_text
 from plant_models.hybrid import HybridSystem
 from plant_models.railway.vehicle.locomotive import Locomotive
 
-PAGE = Path(__file__).parents[1] / "regression_tests.md"
+PAGE = Path(__file__).parents[1] / "guide" / "regression_tests.md"
 OWN_TOOL = 'generationTool="fmu-observer"'
 OLD = 'generationTool="Modeller R2021b" generationDateAndTime="2026-03-02T08:00:00Z"'
 NEW = 'generationTool="Modeller R2023a" generationDateAndTime="2026-11-20T08:00:00Z"'

@@ -14,7 +14,7 @@ from cosim.comparison.comparison_text import MOST_LINES
 
 ROOT = Path(__file__).resolve().parents[3]
 STUDIES = ROOT / "docs" / "studies"
-PAGE = ROOT / "docs" / "regression_tests.md"
+PAGE = ROOT / "docs" / "guide" / "regression_tests.md"
 NAMES = ("changed_deliveries", "deliveries", "page_tables")
 
 pytestmark = pytest.mark.compiler

@@ -140,7 +140,7 @@ def test_list_names_everything_with_its_source(capsys: pytest.CaptureFixture[str
 
 
 def test_list_begins_with_what_is_recommended(capsys: pytest.CaptureFixture[str]) -> None:
-    page = (Path(__file__).parents[3] / "docs" / "choosing_an_observer.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "guide" / "choosing_an_observer.md").read_text(encoding="utf-8")
     assert len(RECOMMENDED) == 5
     for name in RECOMMENDED:
         assert name in OBSERVERS
