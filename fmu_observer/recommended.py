@@ -13,3 +13,9 @@ RECOMMENDED: Mapping[str, str] = {
     "takagi_sugeno_cdo": "effort, an odometer and balises; preset long_gaps is stable at any gap",
 }
 """By name, in the order in which they are tried: what one has who takes it. See docs/guide/choosing_an_observer.md."""
+
+EXHIBITS: Mapping[str, str] = {
+    "augmented_high_gain_cdo": "as published, for balises every half second and a gradient that is known",
+    "multirate_cdo": "as published, for balises every half second",
+}
+"""Observers of a train that are close to the best nowhere in docs/studies/choosing.py, and what each is for."""
