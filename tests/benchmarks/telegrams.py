@@ -112,7 +112,7 @@ def run(kind: str, stepper: str, latency: float, *, counted: bool, stop: float =
 
     setattr(owner, name, watched)
     try:
-        result = scenario(kind, stepper, latency, stop).run(warn=lambda _: None).result
+        result = scenario(kind, stepper, latency, stop).run(warn=lambda _: None, progress=False).result
     finally:
         setattr(owner, name, step)
     if stepper != "python":  # all steps at once

@@ -10,6 +10,7 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.report.page.run_statements import run_statements
+from cosim.report.page.run_verdict import observer_statuses
 from cosim.run.signal_roles import ROLES
 from cosim.studies.measures import error_measures
 
@@ -53,7 +54,8 @@ def test_measures_cards_and_expectations_need_no_report_table() -> None:
     assert error_measures(outcome)["observer.speed_error_max"] == pytest.approx(error, abs=1e-12)
     assert [evaluated.passed for evaluated in outcome.expectations] == [True]
     assert {"Largest speed error", "Largest position error"} <= {
-        fact[0] for fact in run_statements(outcome.result, outcome.spec)
+        fact[0]
+        for fact in run_statements(outcome.result, outcome.spec, observer_statuses(outcome.result, outcome.spec))
     }
 
 
