@@ -89,8 +89,8 @@ def used_allowance(result: Result, spec: ReportSpec, name: str, allowance: Allow
     """
     error, allowed = estimation_error(result, spec, name, "position"), allowance.at(result, spec)
     settled = result.time >= spec.evaluate_after
-    if error is None or allowed is None or not np.any(settled):
-        return None
+    if error is None or allowed is None or len(np.unique(result.time[settled])) < 2:
+        return None  # one row has no length that an error could be weighed by
     time, error, allowed = result.time[settled], np.abs(error[settled]), allowed[settled]
     shares = np.where(np.isfinite(error), error, np.inf) / allowed
     place = int(np.argmax(shares))

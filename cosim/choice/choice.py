@@ -18,6 +18,7 @@ from cosim.choice.playback import connection
 from cosim.choice.ranking import Row
 from cosim.errors import RunError
 from cosim.report.page.observer_page import Answer, write_benchmark
+from cosim.run.checked_observers import presets_of_other_plants
 from cosim.simulation.scenario import Scenario
 from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
@@ -77,11 +78,12 @@ class Choice(Readable):
         if not self.found:
             return "no observer came through. " + "; ".join(f"{row.label}: {row.why_not()}" for row in self.rows)
         best = self.best
+        stopped = f"interrupted after {len(self.disturbances)} runs; so far: " if self.interrupted else ""
         if best.safe:
             text = f"use {best.label}" + ("" if best.certified else " (nothing certifies it for these gaps)")
         else:
             text = f"nothing is safe here, least bad {best.label}, because of {best.why_not(self._acting(best))}"
-        return f"{text}: {self._numbers(best)}"
+        return f"{stopped}{text}: {self._numbers(best)}"
 
     @property
     def groups(self) -> dict[str, list[Row]]:
@@ -111,7 +113,10 @@ class Choice(Readable):
 
     def lines(self) -> str:
         """The best observer as lines of a scenario."""
-        candidate, name = self.best.candidate, "observer"
+        candidate = self.best.candidate
+        name = candidate.name
+        if candidate.origin == "scenario":
+            return f"# it is in the scenario already: components.{name}"
         table = candidate.table.model_dump(by_alias=True, exclude_unset=True)
         links = [connection(link, f"{name}.{signal}") for signal, link in candidate.sources.items()]
         text = tomli_w.dumps({"components": {name: table}})
@@ -174,11 +179,18 @@ class Choice(Readable):
     def _done(self) -> str:
         names = ", ".join(disturbance.name for disturbance in self.disturbances)
         tried = [row for row in self.rows if row.tried]
-        stopped = " Interrupted: the other runs are missing." if self.interrupted else ""
-        return (
+        done = (
             f"{len(tried)} observers on {names} of {self.benchmark.spec.title}. Allowance: {self.allowance.text}. "
-            f"Harder runs do not count.{stopped}\n{self.best.label}: {' '.join(self.best.candidate.settings)}"
+            "The harder run has disturbances of its own, drawn twice as large; it does not count."
         )
+        return "\n".join([done, *self._remarks()])
+
+    def _remarks(self) -> list[str]:
+        """How the best observer was set, and what a run will say of its preset."""
+        candidate = self.best.candidate
+        others = presets_of_other_plants({candidate.name: candidate.table}, self.scenario.where)
+        settings = [f"{self.best.label}: {' '.join(candidate.settings)}"] if candidate.settings else []
+        return [*settings, *(f"{text} Here it was measured, and is used as it stands." for text in others)]
 
     def _row_data(self, row: Row) -> dict[str, Any]:
         return {

@@ -184,7 +184,7 @@ def _require_any(benchmark: ObserverBenchmark) -> None:
     settled = (
         f"no row lies behind the start of the evaluation (report.evaluate_after = {benchmark.spec.evaluate_after:g} s)"
     )
-    reason = next((failure for failure in failures if failure is not None), settled)
+    reason = settled if None in failures else failures[0]
     raise RunError(f"The run '{benchmark.disturbance.name}' says nothing of any observer: {reason}")
 
 

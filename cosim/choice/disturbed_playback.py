@@ -122,7 +122,10 @@ def believing(candidate: BenchmarkCandidate, disturbance: Disturbance) -> Benchm
         known: Mapping[str, Any] = table.parameters
     else:
         scalars = {signal.name for signal in system.parameter_signals if signal.size is None}
-        values = values_in_use(table, system)
+        try:
+            values = values_in_use(table, system)
+        except ValueError:  # it refuses what is known of the train, and its run says so
+            return candidate
         known = {name: float(getattr(values, name)) for name in (MASS, *DAVIS) if name in scalars}
     shares = {MASS: disturbance.mass, **dict.fromkeys(DAVIS, disturbance.resistance)}
     changed = {

@@ -12,7 +12,7 @@ from cosim.choice.choose import SEEDS, choose, scenario_for_fmu
 from cosim.cli.arguments import QUIET, settings_argument
 from cosim.cli.output import print_warning
 from cosim.cli.scenarios import load_scenario
-from cosim.errors import RunError
+from cosim.errors import OutputError, RunError
 from cosim.results.results_folder import check_writable
 from cosim.simulation.scenario import Scenario
 from fmus.cli.commands import argument, one_of
@@ -39,7 +39,7 @@ PARSER = {
         "side: as it is, and disturbed with errors of both signs (mass, resistance, slopes, noise, wear, losses, jams "
         "and skids). First comes what stays within the allowance in all runs, then the smallest position error."
     ),
-    "epilog": "Exit codes: 0 there is an answer, 2 error or interrupted; what was evaluated is printed.",
+    "epilog": "Exit codes: 0 there is an answer, 2 error or interrupted: what was evaluated is printed alone.",
 }
 ARGUMENTS = (
     argument("scenario", metavar="SCENARIO|FMU", help="a shipped scenario, a file (.toml or .ssp), or a plant (.fmu)"),
@@ -65,6 +65,7 @@ ARGUMENTS = (
     ),
     argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1)"),
     argument("--write", type=Path, metavar="FILE", help="write the scenario with the observer in it"),
+    argument("--force", action="store_true", help="replace the file of --write where it exists"),
     argument("--out", metavar="DIR", help="also write page and data to this folder"),
     QUIET,
 )
@@ -73,13 +74,15 @@ ARGUMENTS = (
 def execute(options: argparse.Namespace) -> Output:
     """Choose, and write where the options ask for it."""
     demand_casadi()  # hundreds of runs in plain NumPy would take hours
+    if options.write is not None and options.write.exists() and not options.force:
+        raise OutputError(f"{options.write} exists already; choose another name, or replace it with --force.")
     for folder in (options.out, options.record):
         if folder is not None:
             check_writable(folder)
     with ProgressBar("run", silent=options.quiet or options.json) as bar:
         choice = _chosen(options, bar)
     files: dict[str, Path] = {}
-    if options.write is not None and choice.found:
+    if options.write is not None and choice.found and not choice.interrupted:
         files["scenario"] = choice.with_best().save(options.write)
     if options.out is not None:
         files |= choice.write(options.out)

@@ -16,7 +16,7 @@ from cosim.errors import ScenarioError
 from cosim.scenario.package_names import is_package
 from cosim.scenario.shipped import shipped_scenarios, shipped_tables
 from fmu_observer import OBSERVERS
-from fmu_observer.recommended import RECOMMENDED
+from fmu_observer.recommended import EXHIBITS, RECOMMENDED
 from fmus.catalogue import CatalogueEntry, catalogue
 from fmus.cli.commands import argument
 from fmus.cli.list_command import COLUMNS, model_data, model_tables, summary
@@ -148,6 +148,9 @@ def _parts(found: _Found, *, brief: bool) -> list[Table | str]:
     for kind, entries in (("models", found.models), ("observers", found.observers)):
         if entries:
             parts += [f"{kind}:", *model_tables(kind, entries, brief=brief)]
+    shown = [f"{entry.name}, {EXHIBITS[entry.name]}" for entry in found.observers if entry.name in EXHIBITS]
+    if shown:
+        parts += [f"exhibits, close to the best observer nowhere that was tried: {'; '.join(shown)}."]
     return parts
 
 

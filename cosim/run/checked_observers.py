@@ -40,7 +40,7 @@ def check_observers(
     tables, mode, where = task.table.components, task.table.certificates, task.where
     certificates, warnings = evaluate_observers(tables, gaps_to_expect(task, coupled, stated, receivers), mode, where)
     warnings += _unused_balises(tables, receivers, stated.links, where)
-    warnings += _other_plants(tables, where)
+    warnings += presets_of_other_plants(tables, where)
     warnings += _working_points(tables, stated.links, where)
     remarks.warn(*warnings)
     return certificates
@@ -118,7 +118,7 @@ def _working_points(components: Mapping[str, ComponentTable], links: Sequence[Li
     return warnings
 
 
-def _other_plants(components: Mapping[str, ComponentTable], where: str) -> list[str]:
+def presets_of_other_plants(components: Mapping[str, ComponentTable], where: str) -> list[str]:
     """Observers with a preset that was made for another plant than the one that their parameters describe.
 
     Args:

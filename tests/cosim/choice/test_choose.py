@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,9 @@ def test_every_run_counts_but_the_harder_one(choice: Choice) -> None:
 
 
 def test_the_lines_to_paste_are_a_component_that_knows_the_train(choice: Choice) -> None:
-    assert "[components.observer]" in choice.lines()
+    name = choice.best.candidate.name
+    assert f"[components.{name}]" in choice.lines()
+    assert f"-> {name}.odometer" in choice.lines()
     quasi = next(row for row in choice.rows if row.label == "quasi_lpv_uio")
     assert quasi.candidate.table.parameters["mass"] == 90e3  # of the plant, by default, in place of its own 1 kg
     assert quasi.candidate.table.parameters["estimated_speed"] == 10.0
@@ -66,6 +69,31 @@ def test_what_fails_nominally_is_not_run_again_and_says_why() -> None:
     assert not lost.safe
     assert "diverged" in lost.why_not()
     assert found.best.label == "odometer_reset"
+
+
+def test_an_observer_that_refuses_what_is_known_of_the_train_says_so_and_ends_nothing() -> None:
+    """Some trains have a negative Davis coefficient, as printed; an observer that does not allow it is no answer."""
+    found = choose(Scenario.load("jam_odometry").set("stop", 12.0), ["adaptive_gain_cdo", "odometer_reset"], seeds=1)
+    assert found.best.candidate.model == "odometer_reset"
+    refused = next(row for row in found.rows if row.label == "adaptive_gain_cdo")
+    assert not refused.tried
+    assert "cannot be coupled" in refused.why_not()
+
+
+def test_a_single_row_is_no_run_to_be_evaluated() -> None:
+    with pytest.raises(RunError, match="evaluate_after"):
+        choose(small().set("stop", 3.0).report(evaluate_after=3.0), ["odometer_reset"], seeds=0)
+
+
+def test_an_answer_from_fewer_runs_begins_with_it(choice: Choice) -> None:
+    assert replace(choice, interrupted=True).answer.startswith("interrupted after 4 runs; so far: use ")
+
+
+def test_what_a_run_will_say_of_the_preset_is_said_with_the_answer() -> None:
+    found = choose(small(), ["balise_odometer_ekf:tuned"], seeds=0)
+    assert any("is made for the 900 t train" in str(part) for part in found.parts())
+    own = choose(small(), ["observer"], seeds=0)
+    assert own.lines() == "# it is in the scenario already: components.observer"
 
 
 def test_where_nothing_comes_through_there_is_no_best() -> None:

@@ -43,6 +43,15 @@ def test_the_answer_comes_first_and_what_is_written_runs(
     assert [entry["name"] for entry in data["runs"]] == ["nominal", "seed 1", "harder 2"]
 
 
+def test_a_file_that_exists_is_kept(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
+    before = Path(scenario).read_bytes()
+    assert main(["choose", scenario, *FEW, "--write", scenario]) == 2
+    assert "exists already; choose another name, or replace it with --force" in capsys.readouterr().err
+    assert Path(scenario).read_bytes() == before
+    assert main(["choose", scenario, *FEW, "--write", scenario, "--force"]) == 0
+    assert Path(scenario).read_bytes() != before
+
+
 def test_the_former_name_says_what_is_typed_now(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["benchmark-observers", scenario])
