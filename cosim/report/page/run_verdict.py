@@ -29,6 +29,7 @@ _CAUSES = ("fault", "zone", "telegram problem", "failure", "message")
 """Kinds of marks that may be why an error is large."""
 _BEFORE = 2.0  # of the usual gaps: as long before, what happened may be why
 _LONG_GAP = 1.5  # of the usual gaps: a longer one is named
+_SHORTLY = 3.0  # [s]: what began or ended as long before may still act on an observer
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,8 +199,10 @@ def largest_finding(result: Result, spec: ReportSpec, statuses: Sequence[Observe
 
 
 def _with_causes(what: str, time: float, observer: str, result: Result, marks: Sequence[Mark]) -> str:
-    causes = list(_causes(time, observer, result, marks))
-    return f"{what}: {'; '.join(causes)}." if causes else f"{what}. No fault, zone or telegram lies near."
+    causes = [*_causes(time, observer, result, marks), *_changes(time, marks), *_telegram_then(time, result, marks)]
+    if causes:
+        return f"{what}: {'; '.join(causes)}."
+    return f"{what}. No fault, zone or change of phase lies near, and no telegram came at that instant."
 
 
 def _causes(time: float, observer: str, result: Result, marks: Sequence[Mark]) -> Iterator[str]:
@@ -220,3 +223,26 @@ def _causes(time: float, observer: str, result: Result, marks: Sequence[Mark]) -
     entry = mapping_entry(result, "certificates").get(observer)
     if isinstance(entry, Mapping) and str(entry.get("holds")) == "False" and entry.get("explanation"):
         yield f"its certificate does not hold: {first_sentence(entry['explanation'])[0]}".rstrip(".")
+
+
+def _changes(time: float, marks: Sequence[Mark]) -> Iterator[str]:
+    """A fault or zone that ended shortly before, a phase that began shortly before: the last of each kind."""
+    ended = [m for m in marks if m.kind in ("fault", "zone") and m.end is not None and 0.0 < time - m.end <= _SHORTLY]
+    for mark in {m.kind: m for m in sorted(ended, key=lambda m: m.end or 0.0)}.values():
+        yield f"{mark.text} until {number(time - (mark.end or 0.0))} s before ({_span(mark)})"
+    began = [m for m in marks if m.kind == "phase" and 0.0 <= time - m.start <= _SHORTLY]
+    for mark in began[-1:]:
+        yield f"{mark.text} began {number(time - mark.start)} s before ({_span(mark)})"
+
+
+def _span(mark: Mark) -> str:
+    return f"{number(mark.start, 4)} to {number(mark.end or 0.0, 4)} s"
+
+
+def _telegram_then(time: float, result: Result, marks: Sequence[Mark]) -> Iterator[str]:
+    """A telegram at that instant: no farther from it than the rows around it."""
+    first = float(np.max(result.time[result.time < time], initial=-np.inf))
+    last = float(np.min(result.time[result.time > time], initial=np.inf))
+    then = [m for m in marks if first <= m.start <= last]
+    for mark in [m for m in then if m.kind == "balise" or (m.kind == "telegram problem" and m.start > time)][-1:]:
+        yield f"{mark.text}, at that instant"
