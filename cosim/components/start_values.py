@@ -13,9 +13,11 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from cosim.components.described import DescribedComponent
+from cosim.components.meant_number import meant_number
 from cosim.errors import CouplingError, nearest
 from fmus.fmi.elements import described
 from fmus.fmi.types import CTYPES, FLOATING_TYPES, NUMERIC_TYPES, enumeration_items, size
+from fmus.fmi.units import Units
 
 Scalar = float | int | bool | str | bytes
 StartValue = Scalar | list[Scalar]
@@ -151,7 +153,9 @@ def _typed(variable: ModelVariable, value: Any) -> Scalar:
         return _item(value, enumeration_items(variable))
     if kind in _WHOLE_TYPES:
         return _whole(kind, value)
-    raise ValueError(f"expected {_EXPECTED.get(kind, 'a number, or a list of numbers for a vector')} (got {value!r})")
+    meant = meant_number(value, Units.name(variable) or "") if kind in FLOATING_TYPES and isinstance(value, str) else ""
+    number = f"a number{meant}" if meant else "a number, or a list of numbers for a vector"
+    raise ValueError(f"expected {_EXPECTED.get(kind, number)} (got {value!r})")
 
 
 def _floating(kind: str, value: float) -> float:

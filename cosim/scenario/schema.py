@@ -263,7 +263,7 @@ def _explain(item: dict[str, Any]) -> str:
     if item["type"] == "value_error" or isinstance(stated, dict):
         return f"{place}: {str(item['msg']).removeprefix('Value error, ')}"
     message = wrong_value(item)
-    if item["loc"][-1:] == ("float",):
+    if item["loc"][-1:] == ("float",) and message == "expected a number":
         message = "expected a number, or a list of numbers for a vector"
     key = str(item["loc"][2]) if item["loc"][:1] == ("components",) and len(item["loc"]) > 2 else ""
     message = EXPECTED.get(key, message)

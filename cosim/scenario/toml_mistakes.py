@@ -14,6 +14,7 @@ _MARKS = dict.fromkeys("“”„‟«»", '"') | dict.fromkeys("‘’‚‛", 
 _KEY = r"^\s*(?P<key>[\w.\"'-]+)\s*"
 _END = r"\s*,?\s*(#.*)?$"
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?"
+_WITH_COMMA = r"=\s*(?P<whole>[-+]?\d+),(?P<part>\d+(?:[eE][-+]?\d+)?)"
 
 
 def mistake(text: str, reason: str) -> str:
@@ -67,7 +68,9 @@ def _in_lines(lines: list[str], number: int) -> str:
 
 
 def _comma(line: str) -> str:
-    found = re.match(_KEY + r"=\s*(?P<whole>[-+]?\d+),(?P<part>\d+(?:[eE][-+]?\d+)?)" + _END, line)
+    """A decimal comma, also in a table within the line."""
+    inner = r"[{,]\s*" + _KEY.removeprefix("^") + _WITH_COMMA + r"\s*[,}]"
+    found = re.match(_KEY + _WITH_COMMA + _END, line) or re.search(inner, line)
     if found is None:
         return ""
     written = f"{found['key']} = {found['whole']}"

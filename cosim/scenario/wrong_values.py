@@ -6,11 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from cosim.components.meant_number import meant_number
 from cosim.errors import nearest
-from plant_models.hybrid.units import UnitError, parse_unit
 
-_COMMA = re.compile(r"\s*([-+]?\d+),(\d+(?:[eE][-+]?\d+)?)\s*")
-_WITH_UNIT = re.compile(r"\s*([-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)\s*([A-Za-zµ°%][\w/.°%]*)\s*")
 _CHOICE = re.compile(r"'([^']*)'")
 _NUMBER = "expected a number"
 _KINDS = {
@@ -55,25 +53,4 @@ def wrong_value(item: Mapping[str, Any]) -> str:
         key, text = _BOUNDS[kind]
         return text.format(context[key])
     expected = _KINDS.get(kind, str(item["msg"]))
-    return expected + (_meant(stated) if _NUMBER in expected and isinstance(stated, str) else "")
-
-
-def _meant(stated: str) -> str:
-    """What a text that stands in place of a number may mean."""
-    for form, meant in ((_COMMA, _with_point), (_WITH_UNIT, _without_unit)):
-        found = form.fullmatch(stated)
-        if found is not None:
-            return meant(*found.groups())
-    return ""
-
-
-def _with_point(whole: str, part: str) -> str:
-    return f"; write a point in place of the comma: {whole}.{part}"
-
-
-def _without_unit(value: str, unit: str) -> str:
-    try:
-        meaning = parse_unit(unit.replace("km/h", "km.h-1"))
-    except UnitError:
-        return " without a unit, in SI units"
-    return f" without its unit, in SI units: {float(value) * meaning.factor + meaning.offset:g}"
+    return expected + (meant_number(stated) if _NUMBER in expected and isinstance(stated, str) else "")

@@ -47,6 +47,16 @@ speed = "train.speed"
 MISTAKES = {
     # numbers
     "decimal comma": ("step = 0.1", "step = 0,1", "line 3: step = 0,1 has a decimal comma; write a point: step = 0.1"),
+    "comma in a table": (
+        "[components.train.parameters]\neffort = 0.1",
+        "parameters = {effort = 0,05}",
+        "line 13: effort = 0,05 has a decimal comma; write a point: effort = 0.05",
+    ),
+    "comma in a longer table": (
+        "[components.train.parameters]\neffort = 0.1",
+        "parameters = {mass = 8e4, effort = -1,5, x = 2}",
+        "line 13: effort = -1,5 has a decimal comma; write a point: effort = -1.5",
+    ),
     "comma in quotes": (
         "step = 0.1",
         'step = "0,1"',
@@ -167,6 +177,10 @@ COMMANDS = {
     "run own.toml --out own.toml": "Results cannot be written to",
     "run own.toml --out /proc/none": "Results cannot be written to /proc/none",
     "run own.toml --set step=0,01": "step: expected a number; write a point in place of the comma: 0.01",
+    "run own.toml --set train.mass=90,5": "mass: expected a number; write a point in place of the comma: 90.5",
+    "run own.toml --set train.mass=90t": "train.mass: expected a number without its unit, in kg: 90000 (got '90t')",
+    "run own.toml --set train.mass=90,5t": "train.mass: expected a number without its unit, in kg: 90500 (got '90,5t')",
+    "run own.toml --set train.mass=90km": "train.mass: expected a number without a unit, in kg (got '90km')",
     "run own.toml --set train.efort=1": "no variable 'efort'; did you mean 'effort'?",
     "run own.toml --set trian.effort=1": "no component 'trian'; did you mean 'train'?",
     "run own.toml --set train.effort": "expected NAME=VALUE",
