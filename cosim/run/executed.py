@@ -13,6 +13,7 @@ import numpy as np
 
 from cosim.components.component import Component
 from cosim.components.surroundings import SurroundingsOfSteps
+from cosim.coupling.connection import Connection
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.messages import FAULTS, in_order
 from cosim.errors import CosimError
@@ -247,6 +248,7 @@ def _summary(
     gaps = {name: GapSeen(gap, "balises") for name in _receivers(ready.services)}
     if ready.coupled.network is not None:
         gaps = packet_gaps(ready.coupled.network, result.packets, start) | gaps
+    gaps |= _counted_gaps(ready.coupled.connections, ready.checked.certificates, result, start)
     certificates, beyond = findings_after(ready.checked.certificates, gaps)
     remarks.warn(*beyond)
     remarks.note(*_missed_samples(ready.coupled.components))
@@ -255,6 +257,25 @@ def _summary(
     found |= evaluated_summary(result, spec)
     if ready.coupled.network is not None:
         found["network"] = network_summary(ready.coupled.network, result.packets, start, float(result.time[-1]))
+    return found
+
+
+def _counted_gaps(
+    connections: Sequence[Connection], certificates: Mapping[str, dict[str, Any]], result: Result, start: float
+) -> dict[str, GapSeen]:
+    """The longest time between samples of those that the count of another component triggers, by the rows recorded.
+
+    Args:
+        connections: of the scenario. certificates: findings by component. result: of the run. start: of the run [s].
+    """
+    found, names = dict[str, GapSeen](), set(result)
+    for connection in connections:
+        (name, target), count = connection.target, ".".join(connection.source)
+        event = certificates.get(name, {}).get("event")
+        if event is not None and target == f"{event}_count" and count in names:
+            instants = result.time[1:][np.diff(result[count]) > 0]
+            gap = max((float(b - a) for a, b in pairwise([start, *instants])), default=None)
+            found[name] = GapSeen(gap, f"samples of {count}")
     return found
 
 

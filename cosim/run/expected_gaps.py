@@ -47,6 +47,7 @@ class ExpectedGap:
 
 _NO_BALISES = ExpectedGap(None, "no balise instant lies within the run")
 UNKNOWN = ExpectedGap(None, "nothing is known about gaps")
+_AT_ITS_PERIOD = "it reads its measurements at this period"
 
 
 @dataclass(frozen=True)
@@ -105,20 +106,33 @@ class Sources:
     ) -> list[ExpectedGap]:
         """Of all events that the finding of a component is about."""
         values = values_in_use(table, system)
-        sampled = system.sampled_events(values)
+        sampled, periods = system.sampled_events(values), _periods(values, system)
         found = [gap for event, gap in notified.items()]
         for event in sampled:
-            if is_wired(self.links, name, event):
-                found.append(
-                    ExpectedGap(None, f"another component triggers its event '{event}', at instants of its own")
-                )
+            if event in periods:
+                found.append(ExpectedGap(periods[event], _AT_ITS_PERIOD))
+            elif is_wired(self.links, name, event):
+                found.append(self._of_trigger(name, event))
             elif event not in notified:
                 whole = self.table.stop - self.table.start
                 found.append(ExpectedGap(whole, f"nothing triggers its event '{event}' in this run", never=True))
         if not sampled:
-            periods = [float(getattr(values, event.period)) for event in system.periodic_events]
-            found.append(ExpectedGap(max(periods), "it reads its measurements at this period"))
+            found.append(ExpectedGap(max(periods.values()), _AT_ITS_PERIOD))
         return found
+
+    def _of_trigger(self, name: str, event: str) -> ExpectedGap:
+        """Of an event that another component triggers: its period where it says that its count is periodic, which is
+        held against the run afterwards.
+        """
+        sources = [source for source, target, *_ in self.links if target == f"{name}.{event}_count"]
+        for source, count in [s.split(".", 1) for s in sources if not self._travels(s, name)]:
+            table = self.table.components[source]
+            system: Any = make_system(table, self.where)
+            for periodic in () if system is None else system.periodic_events:
+                if periodic.counted_by == count:
+                    period = _periods(values_in_use(table, system), system)[periodic.name]
+                    return ExpectedGap(period, f"{source} triggers its event '{event}' at this period")
+        return ExpectedGap(None, f"another component triggers its event '{event}', at instants of its own")
 
     def _of_readings(self, name: str, system: Any) -> list[ExpectedGap]:
         """Of measured inputs that stay as they are for longer than it takes to read them; none where they do not."""
@@ -141,9 +155,8 @@ class Sources:
         rows = float(np.diff(component.recording.time).max(initial=0.0))
         system: Any = make_system(self.table.components[name], self.where)
         table = self.table.components[name]
-        values = values_in_use(table, system)
-        periods = [float(getattr(values, event.period)) for event in system.periodic_events]
-        if rows <= min(periods, default=0.0) * (1.0 + ROUNDING):
+        periods = _periods(values_in_use(table, system), system)
+        if rows <= min(periods.values(), default=0.0) * (1.0 + ROUNDING):
             return []
         reason = f"{target} is held over the rows of {component.name}, up to {rows:g} s, so it is read more than once"
         return [ExpectedGap(None, reason)]
@@ -153,6 +166,11 @@ class Sources:
             return False
         receivers = self.table.network.receivers
         return source in self.network.settings.signals and (receivers is None or name in receivers)
+
+
+def _periods(values: Any, system: Any) -> dict[str, float]:
+    """Periods of the periodic events of a system [s], by event."""
+    return {event.name: float(getattr(values, event.period)) for event in system.periodic_events}
 
 
 def _longest(gaps: Sequence[ExpectedGap]) -> ExpectedGap:

@@ -22,7 +22,7 @@ from cosim.run.network import Network, NetworkReading, is_wired
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
 
-READINGS = "measured_", "odometer"
+READINGS = "measured_", "odometer", "fix_position"
 """How the inputs begin by which an observer reads a measurement whenever it likes."""
 ROUNDING = 1e-9  # relative, of times
 

@@ -99,7 +99,7 @@ class GapCertified(EvaluatedObserver):
     def limit_findings(self, values: np.ndarray) -> Iterator[Finding]:
         """The first constant gap at which the error grows."""
         constant = self._of_gaps(self.usual_gap, values).condition(CONSTANT_GAP)
-        yield replace(constant, what=f"constant {self._gap_event} gap")
+        yield replace(constant, what=f"constant {self._gap_event(values)} gap")
 
     def deciding_parameters(self) -> tuple[Signal, ...]:
         """Those that decide stability: all but the timing, unless a subclass knows better."""
@@ -123,19 +123,20 @@ class GapCertified(EvaluatedObserver):
             for name, value in zip(signal.scalar_names, np.atleast_1d(getattr(values, signal.name)), strict=True)
         }
 
-    @property
-    def _gap_event(self) -> str:
+    def _gap_event(self, values: np.ndarray) -> str:
         """What the gaps lie between."""
-        return next((e.name for e in self.triggered_events if len(self.triggered_events) == 1), "sample")
+        events = self.sampled_events(self.unpack_parameters(values))
+        return events[0] if len(events) == 1 else "sample"
 
     def _found(self, gap: float | None, values: np.ndarray, preset: str | None) -> Iterator[Finding]:
         found = self._of_gaps(self.usual_gap if gap is None else gap, values)
-        found = replace(found, what=f"mixed {self._gap_event} gaps")
+        event = self._gap_event(values)
+        found = replace(found, what=f"mixed {event} gaps")
         if gap is None:
             yield replace(found, holds=None, demand=None)
         else:
             who = f"{self.name} ({preset or self.default_preset or 'declared starts'})"
-            yield replace(found, explanation=explained_gaps(found, who, self._gap_event))
+            yield replace(found, explanation=explained_gaps(found, who, event))
             if not found.holds:
                 yield from self._other_gains(gap, values)
         yield from super()._found(gap, values, preset)

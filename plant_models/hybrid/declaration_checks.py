@@ -56,6 +56,8 @@ def _check_references(system: Declarations, where: str) -> None:
                 raise ValueError(
                     f"{where}: event {event.name!r} refers to unknown parameter {reference!r}; expected a scalar one."
                 )
+        if event.counted_by and event.counted_by not in {s.name for s in system.outputs}:
+            raise ValueError(f"{where}: event {event.name!r} is counted by {event.counted_by!r}; expected an output.")
     vectors = {s.name for s in system.parameters if s.size is not None}
     for resource in system.resources:
         if resource.parameter not in vectors:

@@ -74,6 +74,7 @@ class PeriodicEvent:
         samples: names of inputs that are measurements read at this event, each of which can be missing (NaN). Where
             one is, the event does not occur, unless `leaves_out` says otherwise; the system counts what was missing.
         leaves_out: whether `jump` is called with NaN and leaves out each of the samples itself (`hybrid.missing`).
+        counted_by: name of the output that goes up by one at every instant, for others to be triggered by; or empty.
     """
 
     name: str
@@ -83,6 +84,7 @@ class PeriodicEvent:
     description: str = ""
     samples: tuple[str, ...] = ()
     leaves_out: bool = False
+    counted_by: str = ""
 
 
 @dataclass(frozen=True, slots=True)

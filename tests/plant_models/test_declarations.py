@@ -41,6 +41,10 @@ def _system(**attributes: Any) -> HybridSystem:
         ({"inputs": (input_signal("time", "s"),)}, "used twice or reserved: time"),
         ({"states": (memory("m", "1"), state("x", "m"))}, "continuous states before memory"),
         ({"events": (PeriodicEvent("tick", "period"),)}, "unknown parameter 'period'"),
+        (
+            {"parameters": (parameter("T", "s", 1.0),), "events": (PeriodicEvent("tick", "T", counted_by="ticks"),)},
+            "counted by 'ticks'",
+        ),
         ({"presets": {"fast": {"gain": 2.0}}}, r"preset 'fast' sets unknown parameters \['gain'\]"),
     ],
 )

@@ -201,7 +201,7 @@ class AugmentedTrainObserver(TrainObserver):
 
     def sampled_events(self, p: Any) -> tuple[str, ...]:
         """Balises, or fixes where balises have no gains; what comes beside them is judged as a mixture."""
-        return ("balise",) if float(self.gains_of("balise", p)[0][0]) > 0.0 else ("gps",)
+        return ("balise",) if float(self.gains_of("balise", p)[0][0]) > 0.0 else (self.estimator_events[0].name,)
 
     # -- internals --------------------------------------------------------------------------------------------------
 

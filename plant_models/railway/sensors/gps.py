@@ -71,6 +71,7 @@ class Gps(HybridSystem):
                 standard_normal("white_noise", "Standard normal number of the white noise"),
             ),
             description="A fix is taken",
+            counted_by="gps_count",
         ),
     )
     presets = {

@@ -22,6 +22,7 @@ from cosim.network.intervals import BY_ERROR, longest_interval, sends_in_turn
 from cosim.network.settings import NetworkSettings, Node
 from cosim.run import observer_findings
 from cosim.run.expected_gaps import ExpectedGap
+from cosim.scenario.scenario_tables import Backend
 from fmu_observer import OBSERVERS
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.gap_findings import CONSTANT_GAP, gap_finding
@@ -309,6 +310,42 @@ def test_what_never_gets_a_sample_is_not_warned_of_sequences_of_gaps() -> None:
     assert reported.startswith(begin)
     assert "certified for gaps up to" in reported
     assert "sequences" not in reported
+
+
+@pytest.mark.parametrize("name", ["augmented_high_gain_cdo", "augmented_takagi_sugeno_cdo"])
+@pytest.mark.parametrize("form", ["block2", "block3"])
+def test_fixes_that_are_read_at_a_period_are_certified_at_it(name: str, form: Backend) -> None:
+    s = Scenario(stop=2.0, step=0.1).add("train", model="locomotive", backend="block3")
+    s.add("receiver", model="gps", backend=form).connect("train.position -> receiver.position")
+    s.add("obs", observer=name, preset="gps", options={"fixes": "sampled"}, backend=form)
+    s.connect("train.wheel_speed -> obs.odometer").connect("receiver.reading -> obs.fix_position")
+    outcome = s.run(warn=lambda _: None)
+    certificate = outcome.result.summary["certificates"]["obs"]
+    assert (certificate["holds"], certificate["max_gap"], certificate["event"]) == (True, 0.1, "fix")
+    assert not [text for text in outcome.warnings if "trigger" in text or "gap" in text]
+
+
+def test_fixes_that_arrive_by_packets_are_not_certified_at_the_period_of_reading() -> None:
+    s = Scenario(stop=2.0, step=0.1).add("train", model="locomotive", backend="block3")
+    s.add("receiver", model="gps", backend="block3").connect("train.position -> receiver.position")
+    s.add("obs", observer="augmented_high_gain_cdo", preset="gps", options={"fixes": "sampled"}, backend="block3")
+    s.connect("train.wheel_speed -> obs.odometer").connect("receiver.reading -> obs.fix_position")
+    s.network(nodes={"radio": ["receiver.reading"]}, period=0.1, loss_fraction=0.5)
+    (text,) = [text for text in s.run(warn=lambda _: None).warnings if "sample gaps" in text or "fix gaps" in text]
+    assert "obs.fix_position arrives by packets" in text
+
+
+@pytest.mark.parametrize("period", [0.1, 0.2])
+def test_an_event_that_a_periodic_count_triggers_is_certified_at_its_period(period: float) -> None:
+    s = Scenario(stop=2.0, step=0.1).add("train", model="locomotive", backend="block3")
+    s.add("receiver", model="gps", parameters={"sample_period": period}, backend="block2")
+    s.add("obs", observer="augmented_high_gain_cdo", preset="gps", backend="block2")
+    s.connect("train.position -> receiver.position").connect("train.wheel_speed -> obs.odometer")
+    for field in ("count", "time", "position"):
+        s.connect(f"receiver.gps_{field} -> obs.gps_{field}")
+    certificate = s.run(warn=lambda _: None).result.summary["certificates"]["obs"]
+    assert (certificate["holds"], certificate["max_gap"], certificate["event"]) == (True, period, "gps")
+    assert certificate["largest_gap_seen"] == pytest.approx(period)
 
 
 def test_what_has_no_certificate_is_reported_in_words() -> None:

@@ -77,6 +77,18 @@ def sanded(outcome: Outcome, *, controller: bool = True) -> bool:
     return bool(max(asked, rows(outcome, "controller.sanding_request").max() if controller else 0.0) > 0.5)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["freight_sc1", "freight_sc3", "freight_sc4"])
+def test_the_certificates_of_the_stories_hold_for_the_fixes_that_come(name: str) -> None:
+    outcome = run(name)
+    found = outcome.result.summary["certificates"]
+    assert {n: (found[n]["holds"], found[n]["max_gap"]) for n in ("multirate_cdo", "takagi_sugeno_cdo")} == {
+        "multirate_cdo": (True, 0.1),
+        "takagi_sugeno_cdo": (True, 0.1),
+    }
+    assert not [text for text in outcome.warnings if "nothing triggers" in text]
+
+
 # -- the stories
 # --------------------------------------------------------------------------------------------------------
 
