@@ -31,7 +31,8 @@ Change = Literal["new", "changed", "unchanged"]
 MARKERS = ("<<<<<<< ", "=======", ">>>>>>> ")
 _HOW_TO_MAKE = "Make it with 'cosim baseline make', or with 'pytest --fmu-baseline=update' where a test uses it."
 
-
+_NAMED = 4
+"""Baselines of a folder that are named; of more the number is."""
 _WRITE_AGAIN = "Restore it from version control, or make it again."
 
 
@@ -275,6 +276,7 @@ def read_baseline(path: str | Path) -> Baseline:
         BaselineError: it is missing, unreadable, cut off, in conflict after a merge, or of another version of the
         layout.
     """
+    _demand_no_folder(Path(path))
     path = baseline_path(path)
     header = _read_header(path)
     files = parts(path)
@@ -304,6 +306,22 @@ def summary_of(header: Header) -> dict[str, Any]:
     ]
     summary: dict[str, Any] = {"title": header.title, "versions": dict(header.versions), **header.span}
     return summary | {"components": components, "events_recorded": header.events is not None}
+
+
+def _demand_no_folder(path: Path) -> None:
+    """Refuse a folder, unless the JSON file of its name stands beside it.
+
+    Raises:
+        BaselineError: it is one; the baselines in it are named.
+    """
+    if not path.is_dir() or (path.name and path.with_name(f"{path.name}.json").is_file()):
+        return
+    inside = sorted(str(file) for file in path.glob("*.json") if is_baseline(file))
+    if not inside:
+        raise BaselineError(f"{path} is a folder without a baseline; expected the .json of one. {_HOW_TO_MAKE}")
+    more = f" and {len(inside) - _NAMED} more" if len(inside) > _NAMED else ""
+    found = f"{', '.join(inside[:_NAMED])}{more}"
+    raise BaselineError(f"{path} is a folder; name the .json of one baseline. It holds {found}.")
 
 
 def _read_header(path: Path) -> Header:

@@ -240,6 +240,22 @@ def test_a_damaged_header_is_refused_in_words(change: Any, says: str, tmp_path: 
     assert "run.json" in str(caught.value)
 
 
+def test_a_folder_is_no_baseline_and_those_in_it_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "other.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(BaselineError, match=r"kept is a folder without a baseline; expected the \.json.*baseline make"):
+        read_baseline(tmp_path / "kept")
+    for name in "abcdef":
+        write_baseline(hand_made(), tmp_path / "kept" / f"{name}.json")
+    monkeypatch.chdir(tmp_path / "kept")
+    with pytest.raises(
+        BaselineError, match=r"^\. is a folder.* It holds a\.json, b\.json, c\.json, d\.json and 2 more\.$"
+    ):
+        read_baseline(".")
+    write_baseline(hand_made(), tmp_path / "kept.json")
+    assert read_baseline(tmp_path / "kept").path == tmp_path / "kept.json"  # the file of that name comes first
+
+
 def test_what_is_missing_is_said_with_what_is_there(tmp_path: Path) -> None:
     write_baseline(hand_made(), tmp_path / "braking.json")
     with pytest.raises(
