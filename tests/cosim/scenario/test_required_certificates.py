@@ -312,8 +312,11 @@ def test_what_never_gets_a_sample_is_not_warned_of_sequences_of_gaps() -> None:
     assert "sequences" not in reported
 
 
+FMUS = [pytest.param(backend, marks=pytest.mark.slow) for backend in ("fmu2", "fmu3")]
+
+
 @pytest.mark.parametrize("name", ["augmented_high_gain_cdo", "augmented_takagi_sugeno_cdo"])
-@pytest.mark.parametrize("form", ["block2", "block3"])
+@pytest.mark.parametrize("form", ["block2", "block3", *FMUS])
 def test_fixes_that_are_read_at_a_period_are_certified_at_it(name: str, form: Backend) -> None:
     s = Scenario(stop=2.0, step=0.1).add("train", model="locomotive", backend="block3")
     s.add("receiver", model="gps", backend=form).connect("train.position -> receiver.position")
@@ -335,17 +338,27 @@ def test_fixes_that_arrive_by_packets_are_not_certified_at_the_period_of_reading
     assert "obs.fix_position arrives by packets" in text
 
 
-@pytest.mark.parametrize("period", [0.1, 0.2])
-def test_an_event_that_a_periodic_count_triggers_is_certified_at_its_period(period: float) -> None:
-    s = Scenario(stop=2.0, step=0.1).add("train", model="locomotive", backend="block3")
-    s.add("receiver", model="gps", parameters={"sample_period": period}, backend="block2")
-    s.add("obs", observer="augmented_high_gain_cdo", preset="gps", backend="block2")
+def counted(period: float, step: float, backend: Backend) -> Outcome:
+    s = Scenario(stop=6.0, step=step).add("train", model="locomotive", backend="block3")
+    s.add("receiver", model="gps", parameters={"sample_period": period}, backend=backend)
+    s.add("obs", observer="augmented_high_gain_cdo", preset="gps", backend=backend)
     s.connect("train.position -> receiver.position").connect("train.wheel_speed -> obs.odometer")
     for field in ("count", "time", "position"):
         s.connect(f"receiver.gps_{field} -> obs.gps_{field}")
-    certificate = s.run(warn=lambda _: None).result.summary["certificates"]["obs"]
+    return s.run(warn=lambda _: None)
+
+
+@pytest.mark.parametrize("period", [0.1, 0.2])
+@pytest.mark.parametrize("backend", ["block2", FMUS[0]])
+def test_an_event_that_a_periodic_count_triggers_is_certified_at_its_period(period: float, backend: Backend) -> None:
+    certificate = counted(period, 0.1, backend).result.summary["certificates"]["obs"]
     assert (certificate["holds"], certificate["max_gap"], certificate["event"]) == (True, period, "gps")
     assert certificate["largest_gap_seen"] == pytest.approx(period)
+
+
+def test_a_count_that_is_seen_more_rarely_than_its_period_is_reported_after_the_run() -> None:
+    (text,) = [text for text in counted(0.1, 1.5, "block2").warnings if "longest gap" in text]
+    assert text.startswith("obs: the longest gap between samples of receiver.gps_count was 1.5 s, certified are ")
 
 
 def test_what_has_no_certificate_is_reported_in_words() -> None:
