@@ -18,10 +18,11 @@ from fmus.fmi.units import Units
 
 INTERFACE = ("input", "output", "parameter", "structuralParameter")
 """Causalities of the variables that are kept; of the others only those that have a start value."""
-SHOWN = 4
-"""Changes of one kind that are named; of more the number is."""
-_ALIKE = 0.4
-"""Share of letters, as difflib counts them, from which on a variable that is new is taken for one that is gone."""
+_SIGNALS = ("input", "output")
+SHOWN = 6
+"""Changes that are named; of more the number is."""
+_ALIKE = 0.6
+"""Share of letters that two names keep when one is edited into the other, from which on they are near."""
 _EXPERIMENT = ("startTime", "stopTime", "stepSize", "tolerance")
 
 
@@ -97,26 +98,28 @@ class DeliveredFmu:
 
         Args:
             now: the other delivery.
+
+        Returns:
+            A few changes, of each kind the first before the second of any; behind them how many more there are.
         """
         gone = [v for name, v in self.variables.items() if name not in now.variables]
         new = [v for name, v in now.variables.items() if name not in self.variables]
         renamed = _renamed(gone, new)
         both = [(v, now.variables[name]) for name, v in self.variables.items() if name in now.variables]
-        both += renamed
         used = {id(variable) for pair in renamed for variable in pair}
-        return [
-            *_cut([_start(one, two) for one, two in both if not _equal_start(one, two)], "start values"),
-            *_cut(
-                [_changed(two.name, "unit", one.unit, two.unit) for one, two in both if one.unit != two.unit], "units"
-            ),
-            *_cut([_causality(one, two) for one, two in both if one.causality != two.causality], "causalities"),
-            *_cut([f"{one.causality} {one.name} renamed {two.name}" for one, two in renamed], "renamed variables"),
-            *_cut([f"{v.causality} {v.name} removed" for v in gone if id(v) not in used], "removed variables"),
-            *_cut([f"{v.causality} {v.name} added" for v in new if id(v) not in used], "added variables"),
-            *_experiment(self.experiment, now.experiment),
-            *([] if self.tool == now.tool else [f"tool {self.tool or 'not stated'} -> {now.tool or 'not stated'}"]),
-            *([] if self.date == now.date else [f"made {self.date or 'not stated'} -> {now.date or 'not stated'}"]),
-        ]
+        return _few(
+            [
+                [_start(one, two) for one, two in both if not _equal_start(one, two)],
+                [_changed(two.name, "unit", one.unit, two.unit) for one, two in both if one.unit != two.unit],
+                [_causality(one, two) for one, two in both if one.causality != two.causality],
+                [f"{one.causality} {one.name} renamed {two.name}" for one, two in renamed],
+                [f"{v.causality} {v.name} removed" for v in gone if id(v) not in used],
+                [f"{v.causality} {v.name} added" for v in new if id(v) not in used],
+                _experiment(self.experiment, now.experiment),
+                [] if self.tool == now.tool else [f"tool {self.tool or 'not stated'} -> {now.tool or 'not stated'}"],
+                [] if self.date == now.date else [f"made {self.date or 'not stated'} -> {now.date or 'not stated'}"],
+            ]
+        )
 
 
 def _variable(variable: ModelVariable) -> DeliveredVariable:
@@ -178,12 +181,14 @@ def _causality(one: DeliveredVariable, two: DeliveredVariable) -> str:
 def _renamed(
     gone: Iterable[DeliveredVariable], new: Iterable[DeliveredVariable]
 ) -> list[tuple[DeliveredVariable, DeliveredVariable]]:
-    """Variables that are gone, with the new one of the same causality and unit: the only one, or nearest in name."""
+    """Variables that are gone, with the new one that equals them but for a near name. An input or output that is the
+    only one of its unit on either hand may have any name.
+    """
     gone, left, pairs = list(gone), list(new), []
     for variable in gone:
         equal = [v for v in left if _equal_role(v, variable)]
         found = max(equal, key=lambda v: _alike(variable, v), default=None)
-        alone = len(equal) == 1 == sum(_equal_role(v, variable) for v in gone)
+        alone = variable.causality in _SIGNALS and len(equal) == 1 == sum(_equal_role(v, variable) for v in gone)
         if found is not None and (alone or _alike(variable, found) >= _ALIKE):
             left.remove(found)
             pairs.append((variable, found))
@@ -191,7 +196,7 @@ def _renamed(
 
 
 def _equal_role(one: DeliveredVariable, two: DeliveredVariable) -> bool:
-    return (one.causality, one.unit) == (two.causality, two.unit)
+    return (one.causality, one.unit) == (two.causality, two.unit) and _equal_start(one, two)
 
 
 def _alike(one: DeliveredVariable, two: DeliveredVariable) -> float:
@@ -207,7 +212,9 @@ def _experiment(before: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
     ]
 
 
-def _cut(changes: Sequence[str], what: str) -> list[str]:
-    """The first of some changes, and how many more there are."""
-    more = len(changes) - SHOWN
-    return [*changes[:SHOWN], f"{more} more {what}"] if more > 0 else list(changes)
+def _few(kinds: Sequence[Sequence[str]]) -> list[str]:
+    """Some of the changes in their order, and how many more there are."""
+    ranked = sorted((rank, place, text) for place, kind in enumerate(kinds) for rank, text in enumerate(kind))
+    shown = sorted(ranked[:SHOWN], key=lambda change: (change[1], change[0]))
+    more = len(ranked) - len(shown)
+    return [text for _, _, text in shown] + ([f"and {more} more"] if more else [])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from test_fmus.build import linear_fmu
 
 from cosim import Scenario
-from cosim.baselines import check, read_baseline, write_baseline
+from cosim.baselines import check, delivery, read_baseline, write_baseline
 from cosim.baselines.call import Call
 from cosim.baselines.delivery import DeliveredFmu, DeliveredVariable
 from cosim.baselines.header_data import header_data
@@ -86,7 +86,37 @@ def test_causes_of_other_outputs_come_before_tool_and_date_and_many_are_counted(
     before, now = replace(FIRST, variables=several), replace(FIRST, tool="other", variables=more)
     words = before.changes_to(now)
     assert words[0] == "p0 start 0 -> 7.5"
-    assert words[-2:] == ["5 more start values", "tool Modeller R2021b -> other"]
+    assert words[4:] == ["p4 start 4 -> 7.5", "tool Modeller R2021b -> other", "and 4 more"]
+
+
+@given(DELIVERIES, DELIVERIES)
+def test_the_line_of_changes_is_short_and_counts_the_others(before: DeliveredFmu, now: DeliveredFmu) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(delivery, "SHOWN", 1000)
+        every = before.changes_to(now)
+    words = before.changes_to(now)
+    if len(every) <= delivery.SHOWN:
+        assert words == every
+    else:
+        assert words[-1] == f"and {len(every) - delivery.SHOWN} more"
+        assert [text for text in every if text in words] == words[:-1]
+
+
+@pytest.mark.parametrize(
+    ("new", "renamed"),
+    [
+        (replace(MASS, name="m_gesamt"), True),
+        (replace(MASS, name="m_gesamt", start="9.0e1"), True),
+        (replace(MASS, name="m_gesamt", start="80"), False),
+        (replace(MASS, name="m_gesamt", unit="kg"), False),
+        (replace(MASS, name="m_gesamt", causality="local"), False),
+        (replace(MASS, name="payload"), False),
+    ],
+)
+def test_a_parameter_is_renamed_only_where_all_but_a_near_name_agrees(new: DeliveredVariable, renamed: bool) -> None:
+    says = FIRST.changes_to(replace(FIRST, variables={"v": SPEED, new.name: new}))
+    apart = ["parameter m_ges removed", f"{new.causality} {new.name} added"]
+    assert says == ([f"parameter m_ges renamed {new.name}"] if renamed else apart)
 
 
 def first_order(folder: Path, gain: float = 1.0, **more: object) -> Path:
