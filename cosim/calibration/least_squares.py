@@ -251,7 +251,7 @@ def _covariance(slopes: Array, weights: Array, spreads: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Direction:
+class _Direction:
     """A common change of parameters that the signals show too little of.
 
     Attributes:
@@ -285,7 +285,7 @@ _SMALL = 0.05
 """Shares below this are left out of the words."""
 
 
-def unseen_directions(found: Fit, names: Sequence[str], limit: float) -> list[Direction]:
+def unseen_directions(found: Fit, names: Sequence[str], limit: float) -> list[_Direction]:
     """Directions in which the parameters are not identified: the long axes of the confidence ellipsoid.
 
     Args:
@@ -304,5 +304,5 @@ def unseen_directions(found: Fit, names: Sequence[str], limit: float) -> list[Di
             break
         turned = vector / vector[np.argmax(np.abs(vector))]
         shares = {name: float(s) for name, s in zip(names, turned, strict=True) if abs(s) >= _SMALL}
-        directions.append(Direction(shares, deviation))
+        directions.append(_Direction(shares, deviation))
     return directions

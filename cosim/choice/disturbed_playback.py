@@ -17,7 +17,7 @@ _EFFORT, _WHEEL, _ODOMETER = "disturbed_effort", "disturbed_wheel", "disturbed_o
 
 
 @dataclass(frozen=True)
-class DisturbedChannel:
+class _DisturbedChannel:
     """What a signal passes between the recording and the observers.
 
     Args:
@@ -31,7 +31,7 @@ class DisturbedChannel:
     connections: Sequence[Any]
 
 
-def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> list[DisturbedChannel]:
+def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> list[_DisturbedChannel]:
     """The disturbed channels: effort and odometer, as far as there are such signals and something is wrong with them.
 
     Args:
@@ -47,7 +47,7 @@ def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> li
     return found
 
 
-def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> DisturbedChannel:
+def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> _DisturbedChannel:
     """On a slope a train of the same motion needs ``m g i`` more."""
     slopes = disturbance.slopes
     stated = {
@@ -57,10 +57,10 @@ def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> Distu
     }
     options = {"fault_count": len(slopes), "unit": "N"}
     table = {"model": "signal_fault", "options": options, "parameters": stated}
-    return DisturbedChannel(source, f"{_EFFORT}.reading", {_EFFORT: table}, [f"{source} -> {_EFFORT}.healthy"])
+    return _DisturbedChannel(source, f"{_EFFORT}.reading", {_EFFORT: table}, [f"{source} -> {_EFFORT}.healthy"])
 
 
-def _odometer_channel(source: str, disturbance: Disturbance, period: float) -> DisturbedChannel:
+def _odometer_channel(source: str, disturbance: Disturbance, period: float) -> _DisturbedChannel:
     """A wheel that jams and skids, and an odometer that is worn and noisy."""
     faults = disturbance.faults or (OdometerFault(0.0, 0.0, 0.0, -1.0),)
     stated = {f"fault_{key}": [getattr(fault, key) for fault in faults] for key in ("onset", "length", "depth", "kind")}
@@ -70,10 +70,10 @@ def _odometer_channel(source: str, disturbance: Disturbance, period: float) -> D
         {"from": source, "to": f"{_WHEEL}.speed", "factor": disturbance.wheel},
         f"{_WHEEL}.wheel_speed -> {_ODOMETER}.wheel_speed",
     ]
-    return DisturbedChannel(source, f"{_ODOMETER}.reading", {_WHEEL: wheel, _ODOMETER: odometer}, lines)
+    return _DisturbedChannel(source, f"{_ODOMETER}.reading", {_WHEEL: wheel, _ODOMETER: odometer}, lines)
 
 
-def disturbed(data: dict[str, Any], found: Sequence[DisturbedChannel], disturbance: Disturbance) -> dict[str, Any]:
+def disturbed(data: dict[str, Any], found: Sequence[_DisturbedChannel], disturbance: Disturbance) -> dict[str, Any]:
     """The tables of a scenario with the channels in it.
 
     Args:

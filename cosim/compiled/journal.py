@@ -65,7 +65,7 @@ NAMES = {
 }
 
 
-class CNote(ctypes.Structure):
+class _CNote(ctypes.Structure):
     """`Note`."""
 
     _fields_ = (
@@ -82,7 +82,7 @@ class CJournal(ctypes.Structure):
 
     _fields_ = (
         ("on", ctypes.c_int64),
-        ("notes", ctypes.POINTER(CNote)),
+        ("notes", ctypes.POINTER(_CNote)),
         *((name, ctypes.c_int64) for name in ("count", "returns_up_to")),
         ("bytes", ctypes.c_void_p),
         ("used", ctypes.c_int64),
@@ -98,10 +98,10 @@ class StepperJournal:
 
     def __init__(self, head: CJournal, calls: int, values: int) -> None:
         self._head = head
-        self._notes = (CNote * (STEPS_AT_MOST * (calls + CALLS_OF_EVENT) + EARLY_RETURNS))()
+        self._notes = (_CNote * (STEPS_AT_MOST * (calls + CALLS_OF_EVENT) + EARLY_RETURNS))()
         head.returns_up_to = EARLY_RETURNS
         self._bytes = np.zeros(STEPS_AT_MOST * (values + 64), dtype=np.uint8)
-        head.notes, head.bytes = ctypes.cast(self._notes, ctypes.POINTER(CNote)), self._bytes.ctypes.data
+        head.notes, head.bytes = ctypes.cast(self._notes, ctypes.POINTER(_CNote)), self._bytes.ctypes.data
 
     def read(self, versions: Sequence[int]) -> Iterator[tuple[int, StepperCall, int, RecordedReturn]]:
         """Place of the slave, function, port, answer; in the order of the calls.
@@ -112,7 +112,7 @@ class StepperJournal:
         for note in self._notes[: self._head.count]:
             yield note.slave, StepperCall(note.call), note.port, self._response(note, versions[note.slave])
 
-    def _response(self, note: CNote, version: int) -> RecordedReturn:
+    def _response(self, note: _CNote, version: int) -> RecordedReturn:
         call = StepperCall(note.call)
         if call is StepperCall.STEP and version == FMI3:
             event, terminate, early = (bool(flag) for flag in note.flags[:3])

@@ -30,7 +30,7 @@ FMI3 = 3
 Repeating = Callable[[Mapping[int, Mapping[str, Sequence[RecordedReturn]]]], AbstractContextManager[None]]
 
 
-class CTelegram(ctypes.Structure):
+class _CTelegram(ctypes.Structure):
     """`Telegram`."""
 
     _fields_ = (
@@ -82,14 +82,14 @@ class CompiledDelivery:
         self._call, self._slowly = library.stepper_deliver, receiver.step_in_python
         self._arguments = program.address, place, ctypes.addressof(self.telegram), ctypes.addressof(self._times)
 
-    def _telegram(self, port: EventPort, references: Sequence[int | None], counted: Sequence[str]) -> CTelegram:
+    def _telegram(self, port: EventPort, references: Sequence[int | None], counted: Sequence[str]) -> _CTelegram:
         """The event as the stepper knows it.
 
         Args:
             references: value references of what comes with it. counted: variables that say what became of events.
         """
         program, keep, slave = self.program, self.program.keep, self.component.slave
-        telegram = CTelegram(
+        telegram = _CTelegram(
             *(ctypes.cast(slave._functions[name], ctypes.c_void_p).value for name in FUNCTIONS),
             program.function(self.component, "fmi3GetInt32") if self._counts else None,
             keep(np.array(references, dtype=np.uint32)),

@@ -44,13 +44,13 @@ class RecordedReturn:
             for argument, result in zip(arguments[-len(self.results) :], self.results, strict=True):
                 argument._obj.value = result
         if self.values is not None:
-            if len(self.values) != (wanted := bytes_wanted(function, arguments)):
+            if len(self.values) != (wanted := _bytes_wanted(function, arguments)):
                 raise RuntimeError(f"{function} for {wanted} bytes met an answer of {len(self.values)}.")
             ctypes.memmove(arguments[VALUES], self.values, len(self.values))
         return self.status
 
 
-def bytes_wanted(function: str, arguments: Sequence[Any]) -> int:
+def _bytes_wanted(function: str, arguments: Sequence[Any]) -> int:
     """How much a call writes; FMI 3 says the number of values last, before it is the number of references.
 
     Args:

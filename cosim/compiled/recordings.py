@@ -28,7 +28,7 @@ FUNCTIONS: Mapping[str, str] = {
 """By the names of FMI those of the stepper's library."""
 
 
-class CRecording(ctypes.Structure):
+class _CRecording(ctypes.Structure):
     """`Recording`."""
 
     _fields_ = (
@@ -40,7 +40,7 @@ class CRecording(ctypes.Structure):
     )
 
 
-class CFollowedColumn(ctypes.Structure):
+class _CFollowedColumn(ctypes.Structure):
     """`FollowedColumn`."""
 
     _fields_ = (
@@ -50,7 +50,7 @@ class CFollowedColumn(ctypes.Structure):
     )
 
 
-class CFollowed(ctypes.Structure):
+class _CFollowed(ctypes.Structure):
     """`Followed`."""
 
     _fields_ = (
@@ -80,7 +80,7 @@ class NativeRecording:
             slave.stands,
         ]
         time, rows, held, values, stands = (array.ctypes.data for array in self._arrays)
-        self._head = CRecording(time, rows, held, *recording.values.shape, values, stands)
+        self._head = _CRecording(time, rows, held, *recording.values.shape, values, stands)
 
     @property
     def address(self) -> int:
@@ -106,16 +106,16 @@ class FollowedInputs:
 
     def __init__(self, interpolator: MeanInterpolator, inputs: Inputs, native: Callable[[Recording], int]) -> None:
         columns = [
-            CFollowedColumn(native(known.course.recording), column, place, factor, offset)
+            _CFollowedColumn(native(known.course.recording), column, place, factor, offset)
             for known in interpolator.hold.known
             if isinstance(known.course, ColumnCourse)
             for column, place, factor, offset in zip(
                 known.course.places, known.places, known.factors, known.offsets, strict=True
             )
         ]
-        self._columns = (CFollowedColumn * len(columns))(*columns)
+        self._columns = (_CFollowedColumn * len(columns))(*columns)
         self._arrays = np.zeros(len(inputs)), interpolator.over.astype(np.uint8), inputs.held.astype(np.uint8)
-        self._head = CFollowed(
+        self._head = _CFollowed(
             ctypes.addressof(self._columns),
             len(columns),
             *(array.ctypes.data for array in self._arrays),

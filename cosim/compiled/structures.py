@@ -61,7 +61,7 @@ class CPassed(ctypes.Structure):
     )
 
 
-class CBalises(ctypes.Structure):
+class _CBalises(ctypes.Structure):
     """`Balises`."""
 
     _fields_ = (
@@ -90,7 +90,7 @@ class CProgram(ctypes.Structure):
         ("slaves", ctypes.c_void_p),
         ("slave_count", ctypes.c_int64),
         ("watch", CPlantMonitor),
-        ("balises", CBalises),
+        ("balises", _CBalises),
         ("journal", CJournal),
         ("seconds_at_most", ctypes.c_double),
         *((name, ctypes.c_void_p) for name in ("last_call", "last_time", "rows_reported")),

@@ -35,7 +35,7 @@ _ACCEPTED: dict[str, set[str]] = {
 
 
 @dataclass(frozen=True)
-class StatedParameter:
+class _StatedParameter:
     """One value on its way to a variable.
 
     Args:
@@ -85,7 +85,7 @@ class _Applying:
         parameters = {p.name: p for p in binding.parameters}
         if binding.mapping is None:
             for name, parameter in parameters.items():
-                if not self.assign(StatedParameter(parameter), name, path):
+                if not self.assign(_StatedParameter(parameter), name, path):
                     self.lapses.note(
                         parameter.node, f"parameter {name!r} is {self.nothing(name, path)}, so it is ignored."
                     )
@@ -94,10 +94,10 @@ class _Applying:
             if entry.source not in parameters:
                 known = nearest(entry.source, parameters)
                 self.lapses.note(entry.node, f"{entry.source!r} is mapped and not in the parameter set; {known}")
-            elif not self.assign(StatedParameter(parameters[entry.source], entry), entry.target, path):
+            elif not self.assign(_StatedParameter(parameters[entry.source], entry), entry.target, path):
                 fail(entry.node, f"{entry.source!r} is mapped to {entry.target!r}, {self.nothing(entry.target, path)}.")
 
-    def assign(self, stated: StatedParameter, name: str, path: Path) -> bool:
+    def assign(self, stated: _StatedParameter, name: str, path: Path) -> bool:
         """Set everything that `name` can mean within the element at `path`; whether there was anything."""
         points = [p for p in _targets(self.nets.elements[path], path, name) if self.exists(p)]
         for point in points:
@@ -108,7 +108,7 @@ class _Applying:
                 self.spread(stated, arrived, point)
         return bool(points)
 
-    def spread(self, stated: StatedParameter, pipe: Pipe, point: Point) -> None:
+    def spread(self, stated: _StatedParameter, pipe: Pipe, point: Point) -> None:
         """A value for a connector of a system goes to all inputs behind it."""
         for chain in self.nets.chains:
             hops = chain.after(point)
@@ -119,7 +119,7 @@ class _Applying:
                 final = final.through(self.nets.unit(hop.target), hop.suppress, hop.step, hop.node)
             self.set(stated, final.through(self.unit(chain.sink), False, None, stated.node), chain.sink)
 
-    def set(self, stated: StatedParameter, pipe: Pipe, point: Point) -> None:
+    def set(self, stated: _StatedParameter, pipe: Pipe, point: Point) -> None:
         """Set one variable of one component."""
         parameter, node = stated.parameter, stated.node
         interface, name = self.nets.interfaces[point.path], self.variable(point)

@@ -24,7 +24,7 @@ Panel = tuple[str, dict[int, str]]
 
 
 @dataclass(frozen=True, slots=True)
-class OverlayPicture:
+class _OverlayPicture:
     """A drawn figure.
 
     Args:
@@ -37,7 +37,7 @@ class OverlayPicture:
     png: bytes
 
 
-def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> list[OverlayPicture]:
+def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> list[_OverlayPicture]:
     """All figures that the runs have something for.
 
     Args:
@@ -57,7 +57,7 @@ def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> li
         *((f"signal_{i}", name, "As recorded.", _signal_figure(runs, name)) for i, name in enumerate(signals, 1)),
     ]
     return [
-        OverlayPicture(f"overlay_{key}", title, text, png(figure))
+        _OverlayPicture(f"overlay_{key}", title, text, png(figure))
         for key, title, text, figure in made
         if figure is not None
     ]

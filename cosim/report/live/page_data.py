@@ -31,7 +31,7 @@ LONG = 200_000
 
 
 @dataclass(frozen=True)
-class PageData:
+class _PageData:
     """What the script of a page reads.
 
     Args:
@@ -43,7 +43,7 @@ class PageData:
     reduced: Sequence[str]
 
 
-def page_data(page: LivePage) -> PageData:
+def page_data(page: LivePage) -> _PageData:
     """The curves of a page, packed.
 
     Args:
@@ -57,7 +57,7 @@ def page_data(page: LivePage) -> PageData:
         "settled": page.settled,
         "marks": [_mark(mark) for mark in page.marks if isfinite(mark.start)],
     }
-    return PageData(jsonable(data), packer.blocks, packer.reduced)
+    return _PageData(jsonable(data), packer.blocks, packer.reduced)
 
 
 class _Packer:

@@ -65,13 +65,13 @@ def write_benchmark(benchmark: BenchmarkScores, directory: str | Path, answer: A
     """
     folder = Path(directory)
     data = json.dumps(jsonable(benchmark.to_data() if answer is None else answer.data), indent=2) + "\n"
-    contents = {PAGE: page_bytes(live_page(benchmark_page(benchmark, answer))), DATA: data.encode("utf-8")}
+    contents = {PAGE: page_bytes(live_page(_benchmark_page(benchmark, answer))), DATA: data.encode("utf-8")}
     with explained(f"The comparison cannot be written to {folder}", "Choose another output folder."):
         write_files(folder, contents)
     return {"page": folder / PAGE, "data": folder / DATA}
 
 
-def benchmark_page(benchmark: BenchmarkScores, answer: Answer | None = None) -> LivePage:
+def _benchmark_page(benchmark: BenchmarkScores, answer: Answer | None = None) -> LivePage:
     """What the page of a comparison of observers shows.
 
     Args:

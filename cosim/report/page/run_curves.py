@@ -19,7 +19,7 @@ _SHOWN_UNITS, _SHOWN_CURVES = 3, 6
 """Of a run without roles: how many units are drawn at first, and how many signals of each."""
 
 
-def error_name(observer: str, quantity: Quantity) -> str:
+def _error_name(observer: str, quantity: Quantity) -> str:
     """Name of the curve of an error.
 
     Args:
@@ -70,7 +70,7 @@ def _errors(result: Result, spec: ReportSpec) -> Iterator[PageCurve]:
             error = estimation_error(result, spec, observer, quantity)
             if error is not None:
                 text = f"Estimated minus true {quantity} of {label(spec, observer)}"
-                name = error_name(observer, quantity)
+                name = _error_name(observer, quantity)
                 yield PageCurve(name, error, UNITS[quantity], False, text, "", label(spec, observer))
 
 
@@ -93,7 +93,7 @@ def run_panels(result: Result, spec: ReportSpec) -> list[PagePanel]:
     errors = any(panel.curves and panel.is_shown for panel in panels[1:])
     if errors or recorded(result, spec.true_speed) is not None:
         return found
-    return [*changing_panels([result]), *(replace(panel, is_shown=False) for panel in found)]
+    return [*_changing_panels([result]), *(replace(panel, is_shown=False) for panel in found)]
 
 
 def _known(result: Result, names: Sequence[str | None]) -> list[str]:
@@ -108,7 +108,9 @@ def _speed(result: Result, spec: ReportSpec) -> PagePanel:
 
 
 def _error_panel(result: Result, spec: ReportSpec, quantity: Quantity) -> PagePanel:
-    names = [error_name(o, quantity) for o in spec.observers if estimation_error(result, spec, o, quantity) is not None]
+    names = [
+        _error_name(o, quantity) for o in spec.observers if estimation_error(result, spec, o, quantity) is not None
+    ]
     return PagePanel(error_panel(quantity), names)
 
 
@@ -117,7 +119,7 @@ def _role_panel(title: str, result: Result, spec: ReportSpec, true: str | None, 
     return PagePanel(title, [*_known(result, [true]), *estimates], is_shown=False)
 
 
-def changing_panels(results: Sequence[Result]) -> list[PagePanel]:
+def _changing_panels(results: Sequence[Result]) -> list[PagePanel]:
     """Signals that change, by unit, those units first that most of them have.
 
     Args:

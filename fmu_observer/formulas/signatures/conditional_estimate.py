@@ -32,7 +32,7 @@ class _Located(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ClassCurve:
+class _ClassCurve:
     """Smooth curve through the centres of clouds, each the cloud of one value: Omar 2012, section 3.5, (3.5.5).
 
     Args:
@@ -66,7 +66,7 @@ class ClassCurve:
         return _Located(self.place_values[place], away[np.arange(len(place)), place])
 
 
-def train_curve(records: np.ndarray, values: Sequence[float], space: PencilSpace) -> tuple[ClassCurve, float]:
+def train_curve(records: np.ndarray, values: Sequence[float], space: PencilSpace) -> tuple[_ClassCurve, float]:
     """Curve of classes in the drawn plane in which it gives the experiments of the training back best [ours: the plane
     with the widest strips may have the classes out of order, and values between them are then lost].
 
@@ -88,7 +88,7 @@ def train_curve(records: np.ndarray, values: Sequence[float], space: PencilSpace
     return best, drawn.margin
 
 
-def _curve(drawn: Drawn, values: np.ndarray) -> ClassCurve:
+def _curve(drawn: Drawn, values: np.ndarray) -> _ClassCurve:
     """Spline through the centres of the clouds in a plane, parametrised by the way along their broken line."""
     classes = np.unique(values)
     clouds = [drawn.points[:, values == value] for value in classes]
@@ -97,7 +97,7 @@ def _curve(drawn: Drawn, values: np.ndarray) -> ClassCurve:
     along = np.concatenate([[0.0], np.cumsum(steps)])
     fine = np.linspace(0.0, along[-1], _PLACES)
     smooth = scipy.interpolate.make_interp_spline(along, centres, k=min(3, len(classes) - 1), axis=1)
-    curve = ClassCurve(drawn.plane, classes, smooth(fine), np.interp(fine, along, classes), 0.0)
+    curve = _ClassCurve(drawn.plane, classes, smooth(fine), np.interp(fine, along, classes), 0.0)
     return replace(curve, reach=float(curve.nearest(drawn.points).distance.max()))
 
 
@@ -115,7 +115,7 @@ class Estimated(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ConditionalEstimator:
+class _ConditionalEstimator:
     """First one quantity, then a second one under its condition: Omar 2012, section 3.5.
 
     Args:
@@ -123,8 +123,8 @@ class ConditionalEstimator:
             only value that it has there.
     """
 
-    first: ClassCurve
-    second: Mapping[float, ClassCurve | float]
+    first: _ClassCurve
+    second: Mapping[float, _ClassCurve | float]
 
     def estimate(self, records: np.ndarray, reach: float = 1.0) -> Estimated:
         """Both quantities; the second is blended linearly between the classes of the first, (3.5.7).
@@ -146,7 +146,7 @@ class ConditionalEstimator:
 
     def _second(self, value: float, records: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
         curve = self.second[value]
-        if not isinstance(curve, ClassCurve):
+        if not isinstance(curve, _ClassCurve):
             count = np.asarray(records).shape[1]
             return np.full(count, curve), np.ones(count, dtype=bool)
         located = curve.locate(records)
@@ -155,7 +155,7 @@ class ConditionalEstimator:
 
 def train_conditional(
     records: np.ndarray, first: Sequence[float], second: Sequence[float], space: PencilSpace
-) -> tuple[ConditionalEstimator, dict[str, float]]:
+) -> tuple[_ConditionalEstimator, dict[str, float]]:
     """Curves of both stages from experiments at known places.
 
     Args:
@@ -170,11 +170,11 @@ def train_conditional(
     """
     records, other = np.asarray(records, dtype=float), np.asarray(second, dtype=float)
     curve, margin = train_curve(records, first, space)
-    margins, stages = {"first": margin}, dict[float, ClassCurve | float]()
+    margins, stages = {"first": margin}, dict[float, _ClassCurve | float]()
     for value in curve.values:
         here = np.asarray(first) == value
         if len(np.unique(other[here])) < 2:
             stages[float(value)] = float(other[here][0])
             continue
         stages[float(value)], margins[f"second at {value:g}"] = train_curve(records[:, here], list(other[here]), space)
-    return ConditionalEstimator(curve, stages), margins
+    return _ConditionalEstimator(curve, stages), margins
