@@ -70,7 +70,7 @@ CHECK = (
     argument("file", metavar="FILE.json", help="the baseline, or an FMU that holds references"),
     argument("--against", metavar="FMU_OR_RESULT", help="another FMU to run, or a results folder or table to compare"),
     argument("--reference", metavar="NAME", help="of several references in an FMU: this one only"),
-    argument("--plots", metavar="DIR", help="write a page with pictures of what differs to this folder"),
+    argument("--plots", metavar="DIR", help="write a page and pictures of what differs to this folder"),
     argument("--verbose", action="store_true", help="print all signals and everything that was found"),
     ALLOWED,
 )
@@ -178,7 +178,7 @@ def _drawn(output: Output, found: Sequence[Regression], folder: Path) -> Output:
     try:
         for one in found:
             several = len(found) > 1
-            paths = write_comparison(one, folder / one.reference if several else folder)
+            paths = write_comparison(one, folder / one.reference if several else folder, pictures=True)
             files |= {f"{kind} of {one.reference}" if several else kind: path for kind, path in paths.items()}
     except OutputError as error:
         return replace(output, files=files, error=error)
