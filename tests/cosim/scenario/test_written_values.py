@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -92,14 +93,17 @@ def test_a_run_and_a_package_take_equal_values_and_refuse_in_equal_words(
     variable, value = data.draw(st.sampled_from(inputs(component))), data.draw(st.sampled_from(WRITTEN))
     parameters = {variable.name: value}
     found = taken(component, variable.name, value)
-    s = cosim.Scenario(stop=0.1, step=0.1).add("a", fmu=component.source, parameters=parameters)
     package = tmp_path_factory.mktemp("ssp") / "a.ssp"
+    plain = cosim.Scenario(stop=0.1, step=0.1)
     if isinstance(found, CouplingError):
-        for refused in (s.run, lambda: s.export_ssp(package)):
+        unchecked = plain.copy().add("a", fmu=component.source).with_settings({f"a.{variable.name}": value})
+        stated = partial(plain.add, "a", fmu=component.source, parameters=parameters)
+        for refused in (stated, unchecked.run, partial(unchecked.export_ssp, package)):
             with pytest.raises(CosimError) as raised:
                 refused()
             assert str(found) in str(raised.value)
         return
+    s = plain.add("a", fmu=component.source, parameters=parameters)
     assert in_summary(s) == {variable.name: shown(found)}
     if component.fmi_version > 1:  # SSP knows no FMI 1.0
         assert in_summary(cosim.Scenario.load(str(s.export_ssp(package)))) == {variable.name: shown(found)}
