@@ -37,7 +37,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Scenario:
     scenario.add("odometer", model="odometer", **{"as": "block3"}, parameters={"noise_std": 0.1})
     scenario.connect("train.wheel_speed -> odometer.wheel_speed")
     balises = {"position": "train.position", "speed": "train.speed", "odometer": "odometer.reading"}
-    return scenario.balises(**balises, layout="csv", latency_jitter=0.01)
+    return scenario.balises(**balises, layout="csv", file="balises.csv", latency_jitter=0.01)
 
 
 def last(outcome: Any) -> float:
