@@ -83,17 +83,16 @@ def _benchmark_page(benchmark: BenchmarkScores, answer: Answer | None = None) ->
         spec = replace(spec, observers=[name for name in spec.observers if name in names])
     failed = [f"{score.label}: {score.failure}" for score in benchmark.scores if score.failure is not None]
     telegrams = telegrams_table({s.label: s.telegrams for s in benchmark.scores if s.telegrams}, {}, "Observer")
-    lead = f"{len(benchmark.scores)} observers, each alone beside the same recorded run of {benchmark.steps} steps."
     return LivePage(
-        title=f"Observers on one run: {benchmark.spec.title}",
+        title=f"{'Observers on one run' if answer is None else 'Which observer'}: {benchmark.spec.title}",
         verdict=_verdict(benchmark) if answer is None else PageVerdict(answer.text, "" if answer.good else "bad"),
-        lead=lead,
+        lead=_lead(benchmark, answer),
         recordings=[] if result is None else [run_recording(result, spec)],
         panels=[] if result is None else run_panels(result, spec),
         marks=[] if result is None else run_marks(result, spec),
         settled=spec.evaluate_after,
         sections=[
-            *([] if answer is None else [Section("Choice", [Rows(g) for g in answer.groups if g], is_open=True)]),
+            *(Section(_heading(g), [Rows(g)], is_open=True) for g in (() if answer is None else answer.groups) if g),
             Section("Without numbers, or cut short", [failed], mood="doubt"),
             Section("Overview", [Rows(benchmark.table())], is_open=True),
             Section("Errors by phase", [Rows(benchmark.errors(), plots=False)]),
@@ -102,6 +101,19 @@ def _benchmark_page(benchmark: BenchmarkScores, answer: Answer | None = None) ->
             Section("How it was done", [_HOW, [*benchmark.notes]]),
         ],
     )
+
+
+def _lead(benchmark: BenchmarkScores, answer: Answer | None) -> str:
+    """Of which run curves and overview are."""
+    count = f"{len(benchmark.scores)} observers"
+    if answer is None:
+        return f"{count}, each alone beside the same recorded run of {benchmark.steps} steps."
+    return f"Curves and overview show {count}, the best and the plain odometer, in the undisturbed run."
+
+
+def _heading(group: Table) -> str:
+    """The title of a table as that of a section."""
+    return group.title[:1].upper() + group.title[1:]
 
 
 def _verdict(benchmark: BenchmarkScores) -> PageVerdict:

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.report.live.live_page import LivePage, Mark, PageCurve, PagePanel, PageRecording, PageVerdict, Rows, Section
 from cosim.report.live.render import live_page
-from fmus.tables.table import Column, Table, name_column
+from fmus.tables.table import Column, Table, name_column, text_column
 
 TIME = np.linspace(0.0, 100.0, 20_001)
 SPIKE = 12_345
@@ -32,10 +32,9 @@ def curves(scale: float = 1.0) -> list[PageCurve]:
 
 def explored_page(**more: object) -> LivePage:
     """A page with everything: one recording, panels, marks, a table to explore."""
-    rows = [[f"run {i}", 1.0 * ((7 * i) % 12), 100.0 - i] for i in range(12)]
-    table = Table(
-        "runs", [name_column("run", "Run"), Column("gain", "gain", "1"), Column("error", "error", "m/s")], rows
-    )
+    rows = [[f"run {i}", 1.0 * ((7 * i) % 12), 100.0 - i, f"{i} times what is allowed"] for i in range(12)]
+    numbers = [Column("gain", "gain", "1"), Column("error", "error", "m/s")]
+    table = Table("runs", [name_column("run", "Run"), *numbers, text_column("because", "because")], rows)
     values: dict[str, object] = {
         "title": "A page",
         "verdict": PageVerdict("It is good.", "good"),

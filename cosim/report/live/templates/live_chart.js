@@ -137,7 +137,8 @@ class Chart {
     }
   }
 
-  /** Ends of the axis of a unit; a curve that is far larger than the others does not set them. */
+  /** Ends of the axis of a unit; a curve that is far larger than the others does not set them, nor does an estimate
+      before it is evaluated. What has a look of its own (the truth, a reading, what is allowed) is seen whole. */
   limitsOf(unit) {
     const [x, ...columns] = this.plotted, from = Math.max(this.explorer.data.settled ?? -Infinity, this.explorer.range[0]);
     const sizes = this.visible.flatMap((part, i) => {
@@ -146,7 +147,7 @@ class Chart {
       for (const late of [true, false]) {
         for (let k = 0; k < x.length; k++) {
           const v = columns[i][k];
-          if (v == null || x[k] > this.explorer.range[1] || x[k] < (late ? from : this.explorer.range[0])) continue;
+          if (v == null || x[k] > this.explorer.range[1] || x[k] < (late && !part.curve.look ? from : this.explorer.range[0])) continue;
           low = Math.min(low, v); high = Math.max(high, v);
         }
         if (low <= high) break;
@@ -183,7 +184,7 @@ class Chart {
       return a < 0 || b < 0 || this.log ? [] : [{series: [a + 1, b + 1], fill: "#E69F0040"}];
     }));
     return {
-      width, height: explorer.height(), legend: {show: false}, scales, bands, padding: [8, 12, 0, 0],
+      width, height: explorer.height(), legend: {show: false}, scales, bands, padding: [8, 30, 0, 0],
       axes: [{...axis, label: explorer.axisName(), labelFont: font, labelSize: 18, size: 34, values: (_, splits) => splits.map((v) => shown(v, 7))}, ...sides],
       cursor: {y: false, points: {show: false}, drag: {x: true, y: false, setScale: false}, bind: {dblclick: () => () => explorer.zoom(...explorer.whole())}},
       series: [{}, ...this.visible.map((part) => ({

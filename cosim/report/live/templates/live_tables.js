@@ -10,11 +10,12 @@ const vector = (tag, attributes = {}, ...children) => {
   return made;
 };
 
-/** Number in a cell, NaN without one. What diverged is the largest of all. */
-function cellNumber(text) {
+/** Number in a cell, NaN without one. What diverged is the largest of all. isNumber: whether the column holds numbers;
+    in any other a sentence may begin with one. */
+function cellNumber(text, isNumber = true) {
   const plain = text.trim().replace("−", "-");
-  if (/^(∞|diverged)/.test(plain)) return Infinity;
-  return /^[-+]?[\d.]/.test(plain) ? parseFloat(plain) : NaN;
+  if (isNumber && /^(∞|diverged)/.test(plain)) return Infinity;
+  return (isNumber ? /^[-+]?[\d.]/ : /^[-+]?[\d.]+(e[-+]?\d+)?$/i).test(plain) ? parseFloat(plain) : NaN;
 }
 
 class ExploredTable {
@@ -25,7 +26,8 @@ class ExploredTable {
     this.names = this.heads.map((head) => head.textContent.trim());
     this.rows = [...this.table.tBodies].flatMap((body) => [...body.rows]).map((row) => {
       const texts = [...row.cells].map((cell) => (cell.firstChild?.textContent ?? "").trim());
-      return {row, texts, numbers: texts.map(cellNumber), link: row.querySelector("a")?.href};
+      const numbers = texts.map((text, column) => cellNumber(text, this.heads[column]?.classList.contains("number")));
+      return {row, texts, numbers, link: row.querySelector("a")?.href};
     });
     this.brushes = new Map();
     this.heads.forEach((head, column) => {
@@ -113,11 +115,18 @@ class ExploredTable {
     return element("div", {className: "wide", tabIndex: 0, role: "region", ariaLabel: "Parallel coordinates"}, svg);
   }
 
+  /** What stands at an axis: without the component where no other axis is named so, and not too long. */
+  shortName(axis) {
+    const own = ({column}) => this.names[column].replace(/^[^. ]+\./, ""), name = this.names[axis.column];
+    const plain = this.axes.filter((other) => own(other) === own(axis)).length > 1 ? name : own(axis);
+    return plain.length > 24 ? `…${plain.slice(-23)}` : plain;
+  }
+
   /** An axis on which rows are chosen by dragging; a click takes the choice back. */
   axis(svg, axis, x, top, bottom, i) {
     const brush = vector("rect", {x: x - 8, width: 16, y: top, height: 0, class: "brush"});
     const strip = vector("rect", {x: x - 14, width: 28, y: top - 4, height: bottom - top + 8, class: "strip"});
-    const name = this.names[axis.column], short = name.length > 24 ? `…${name.slice(-23)}` : name;
+    const name = this.names[axis.column], short = this.shortName(axis);
     const text = (y, content, style = "middle") => vector("text", {x, y, "text-anchor": style}, content);
     const group = vector("g", {class: "axis"}, vector("line", {x1: x, x2: x, y1: top, y2: bottom}), text(i % 2 ? 11 : 22, short), text(bottom + 14, shown(axis.low, 3)),
       vector("text", {x: x + 4, y: top + 10}, shown(axis.high, 3)), brush, strip, vector("title", {}, `${name}: drag to choose`));
