@@ -18,7 +18,6 @@ from cosim.choice.playback import connection
 from cosim.choice.ranking import Row
 from cosim.errors import RunError
 from cosim.report.page.observer_page import Answer, write_benchmark
-from cosim.run.checked_observers import presets_of_other_plants
 from cosim.simulation.scenario import Scenario
 from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
@@ -188,9 +187,8 @@ class Choice(Readable):
     def _remarks(self) -> list[str]:
         """How the best observer was set, and what a run will say of its preset."""
         candidate = self.best.candidate
-        others = presets_of_other_plants({candidate.name: candidate.table}, self.scenario.where)
         settings = [f"{self.best.label}: {' '.join(candidate.settings)}"] if candidate.settings else []
-        return [*settings, *(f"{text} Here it was measured, and is used as it stands." for text in others)]
+        return [*settings, *(f"{text} Here it was measured, and is used as it stands." for text in self.best.remarks)]
 
     def _row_data(self, row: Row) -> dict[str, Any]:
         return {

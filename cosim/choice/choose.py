@@ -16,6 +16,7 @@ from cosim.choice.choice import Choice
 from cosim.choice.disturbances import Disturbance, Journey, drawn
 from cosim.choice.ranking import NOTHING, Row, ranked
 from cosim.errors import RunError, ScenarioError
+from cosim.run.checked_observers import presets_of_other_plants
 from cosim.runs.engine import run_jobs
 from cosim.runs.executors import make_executor
 from cosim.runs.job import Ended, Failure, Job
@@ -125,7 +126,7 @@ def choose(
     if again and not interrupted:
         others, interrupted = _tried(trials, workers, lambda done: report("disturbed", done + 1, total))
         found += others
-    rows = ranked([_row(name, found) for name in (score.name for score in nominal.scores)])
+    rows = ranked([_row(scenario, score.name, found) for score in nominal.scores])
     done = tuple(benchmark.disturbance for benchmark in found)
     report("done", total, total)
     return Choice(scenario, rows, nominal, done, granted, interrupted)
@@ -188,7 +189,7 @@ def _require_any(benchmark: ObserverBenchmark) -> None:
     raise RunError(f"The run '{benchmark.disturbance.name}' says nothing of any observer: {reason}")
 
 
-def _row(name: str, found: Sequence[ObserverBenchmark]) -> Row:
+def _row(scenario: Scenario, name: str, found: Sequence[ObserverBenchmark]) -> Row:
     """An observer over all runs."""
     used: dict[str, UsedAllowance] = {}
     harder: dict[str, UsedAllowance] = {}
@@ -203,7 +204,9 @@ def _row(name: str, found: Sequence[ObserverBenchmark]) -> Row:
             failures[run] = score.failure
     nominal = found[0]
     score = next(score for score in nominal.scores if score.name == name)
-    return Row(score, nominal.candidates[name], used, harder, failures)
+    candidate = nominal.candidates[name]
+    remarks = presets_of_other_plants({name: candidate.table}, scenario.where) if used else ()
+    return Row(score, candidate, used, harder, failures, remarks)
 
 
 def _is_harder(disturbance: Disturbance) -> bool:

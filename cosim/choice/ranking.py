@@ -25,7 +25,7 @@ class Row:
     Args:
         score: of the nominal run. candidate: how it is set. used: of the allowance, by the name of the run; those that
             count. harder: of the allowance in runs that do not.
-        failures: why it failed, by the name of the run.
+        failures: why it failed, by the name of the run. remarks: what a run says of its preset beside this train.
     """
 
     score: ObserverScore
@@ -33,6 +33,7 @@ class Row:
     used: Mapping[str, UsedAllowance]
     harder: Mapping[str, UsedAllowance] = field(default_factory=dict)
     failures: Mapping[str, str] = field(default_factory=dict)
+    remarks: Sequence[str] = ()
 
     @property
     def label(self) -> str:
@@ -109,7 +110,8 @@ def ranked(rows: Sequence[Row]) -> list[Row]:
 
     Safe ones come before all others, in the order of their errors; but those that differ by less than `TIE` of the
     allowance are as good: of those whose error is within it of the smallest the ones come first whose share of the
-    allowance is within it of the smallest, and of these certified ones. Of unsafe ones the share decides.
+    allowance is within it of the smallest, of these presets that were not made for another train, and of these
+    certified ones. Of unsafe ones the share decides.
 
     Args:
         rows: in any order.
@@ -123,7 +125,9 @@ def ranked(rows: Sequence[Row]) -> list[Row]:
             return 3, row.share, row.rms, row.label
         if row.rms > error:
             return 2, row.rms, row.share, row.label
-        return (1, row.share, row.rms, row.label) if row.share > share else (0, not row.certified, row.rms, row.label)
+        if row.share > share:
+            return 1, row.share, row.rms, row.label
+        return 0, bool(row.remarks), not row.certified, row.rms, row.label
 
     return [*sorted(tried, key=place), *(row for row in rows if not row.tried)]
 
