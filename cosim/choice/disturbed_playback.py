@@ -79,19 +79,19 @@ def disturbed(data: dict[str, Any], found: Sequence[_DisturbedChannel], disturba
     Args:
         data: tables that play a recording back. found: the channels. disturbance: what is wrong.
     """
-    heard_of = {_source(line) for line in data["connections"]}
-    found = [channel for channel in found if channel.source in heard_of]
-    heard = {channel.source: channel.output for channel in found}
+    sources = {_source(line) for line in data["connections"]}
+    found = [channel for channel in found if channel.source in sources]
+    outputs = {channel.source: channel.output for channel in found}
     changed = dict(data)
     changed["components"] = data["components"] | {n: dict(t) for c in found for n, t in c.components.items()}
     changed["connections"] = [
-        *(_moved(line, heard) for line in data["connections"]),
+        *(_moved(line, outputs) for line in data["connections"]),
         *(x for c in found for x in c.connections),
     ]
     if "network" in data:
         network = data["network"]
-        nodes = {node: [heard.get(name, name) for name in names] for node, names in network["nodes"].items()}
-        scales = {heard.get(name, name): value for name, value in network.get("scales", {}).items()}
+        nodes = {node: [outputs.get(name, name) for name in names] for node, names in network["nodes"].items()}
+        scales = {outputs.get(name, name): value for name, value in network.get("scales", {}).items()}
         loss = min(network.get("loss_fraction", 0.0) + disturbance.loss, 0.9)
         changed["network"] = network | {"nodes": nodes, "scales": scales, "loss_fraction": loss}
     return changed
@@ -102,12 +102,12 @@ def _source(line: str | dict[str, Any]) -> str:
     return str(line["from"]) if isinstance(line, dict) else line.partition(" -> ")[0]
 
 
-def _moved(line: str | dict[str, Any], heard: Mapping[str, str]) -> str | dict[str, Any]:
+def _moved(line: str | dict[str, Any], outputs: Mapping[str, str]) -> str | dict[str, Any]:
     """A connection from what observers hear in place of the recorded signal."""
     source = _source(line)
     if isinstance(line, dict):
-        return line | {"from": heard.get(source, source)}
-    return heard.get(source, source) + line.removeprefix(source)
+        return line | {"from": outputs.get(source, source)}
+    return outputs.get(source, source) + line.removeprefix(source)
 
 
 def believing(candidate: BenchmarkCandidate, disturbance: Disturbance) -> BenchmarkCandidate:

@@ -22,7 +22,7 @@ from fmus.tables.numbers import number
 
 _FEWEST_ROWS = 3  # below these there is nothing to enlarge
 MOST = 6  # windows; more would hide what matters
-_NOT_TAKEN = ("late", "ignored", "rejected", "undelivered")
+NOT_TAKEN = ("late", "ignored", "rejected", "undelivered")  # outcomes of a telegram that was not used when it came
 SPIKE = 3.0  # an observer whose error leaves the scale by this factor has diverged: its error is no window
 UNITS: dict[Quantity, str] = {"speed": "m/s", "position": "m"}
 
@@ -151,7 +151,7 @@ def _telegrams(result: Result, spec: ReportSpec, scale: _Scale) -> Iterator[Zoom
     if latest is not None and latest.delivered_at > latest.stamp:
         yield from _at(scale, [latest], f"A telegram {number(1000 * (latest.delivered_at - latest.stamp))} ms late")
     refused = (
-        e for e in delivered if e.kind == "true" and any(outcome in _NOT_TAKEN for outcome in e.outcomes.values())
+        e for e in delivered if e.kind == "true" and any(outcome in NOT_TAKEN for outcome in e.outcomes.values())
     )
     yield from _at(scale, refused, "A telegram that not every observer took")
     stamps = np.array([*accepted_stamps(result.events), np.inf])

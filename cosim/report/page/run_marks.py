@@ -18,11 +18,11 @@ from cosim.evaluation.roles import UNITS, estimate, estimation_error, label, rec
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.live.live_page import Mark
 from cosim.report.page.run_curves import QUANTITIES, error_panel
-from cosim.report.zoom_windows import notable_windows
+from cosim.report.zoom_windows import NOT_TAKEN, notable_windows
 from cosim.results.result import BaliseRecord, Result
 from fmus.tables.numbers import number
 
-NOT_TAKEN = ("late", "ignored", "rejected", "undelivered", "doubted")
+_ODD = (*NOT_TAKEN, "doubted")
 """Outcomes of a telegram that was not used as it came."""
 _MOST = 400
 """Intervals of one kind, messages: more would hide what matters."""
@@ -97,7 +97,7 @@ def _telegram(event: BaliseRecord) -> Mark:
         return Mark("telegram problem", event.stamp, f"balise {event.identity} missed")
     if event.kind == "false":
         return Mark("telegram problem", event.stamp, f"false telegram {event.identity}")
-    odd = [f"{outcome} at {receiver}" for receiver, outcome in event.outcomes.items() if outcome in NOT_TAKEN]
+    odd = [f"{outcome} at {receiver}" for receiver, outcome in event.outcomes.items() if outcome in _ODD]
     if odd:
         return Mark("telegram problem", event.stamp, f"balise {event.identity}: {', '.join(odd)}")
     return Mark("balise", event.stamp, f"balise {event.identity} at {number(event.true_position, 6)} m")
