@@ -15,7 +15,8 @@ RECOMMENDED: Mapping[str, str] = {
 """By name, in the order in which they are tried: what one has who takes it. See docs/guide/choosing_an_observer.md."""
 
 EXHIBITS: Mapping[str, str] = {
-    "augmented_high_gain_cdo": "as published, for balises every half second and a gradient that is known",
-    "multirate_cdo": "as published, for balises every half second",
+    "augmented_high_gain_cdo:gps": "as published, for satellite positions and a gradient that is known",
 }
-"""Observers of a train that are close to the best nowhere in docs/studies/choosing.py, and what each is for."""
+"""Presets of observers of a train that are close to the best nowhere in docs/studies/choosing.py, and what each is for;
+those to begin with are for trains that the study does not have.
+"""

@@ -148,7 +148,8 @@ def _parts(found: _Found, *, brief: bool) -> list[Table | str]:
     for kind, entries in (("models", found.models), ("observers", found.observers)):
         if entries:
             parts += [f"{kind}:", *model_tables(kind, entries, brief=brief)]
-    shown = [f"{entry.name}, {EXHIBITS[entry.name]}" for entry in found.observers if entry.name in EXHIBITS]
+    names = {entry.name for entry in found.observers}
+    shown = [f"{row}, {purpose}" for row, purpose in EXHIBITS.items() if row.partition(":")[0] in names]
     if shown:
         parts += [f"exhibits, close to the best observer nowhere that was tried: {'; '.join(shown)}."]
     return parts

@@ -1,7 +1,7 @@
 """Is the observer that `cosim choose` names the right one? On trains that its rules never saw, beside the truth.
 
-``python docs/studies/choosing.py`` chooses for 20 trains and prints the table of docs/guide/choosing_an_observer.md,
-with ``--write`` it puts it there; that takes ten minutes of CPU. ``--first SEED --trains N`` takes others: the rules
+``python docs/studies/choosing.py`` chooses for 40 trains and prints the table of docs/guide/choosing_an_observer.md,
+with ``--write`` it puts it there; that takes twenty minutes of CPU. ``--first SEED --trains N`` takes others: the rules
 were made with those below 3000, and are held against those from there on.
 
 A train is drawn from its seed. What its scenario says is what a user knows: the mass that stands in the papers, the
@@ -39,7 +39,7 @@ from cosim.choice.ranking import TIE, Row, allowed, ranked
 from fmus.tables.numbers import number
 
 PAGE = Path(__file__).parents[1] / "guide" / "choosing_an_observer.md"
-FIRST, TRAINS, HIDDEN = 3000, 20, 4
+FIRST, TRAINS, HIDDEN = 3000, 40, 4
 STOP, STEP = 150.0, 0.1  # [s]
 WITHIN, CLOSE = 1.2, 1.5  # factors of the smallest error: what a choice must reach, and what makes an exhibit
 GRADIENTS = 8
