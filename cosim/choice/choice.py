@@ -23,6 +23,8 @@ from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
 from fmus.tables.table import Column, Parts, Readable, Table, error_column, name_column, text_column
 
+INTERRUPTED = "interrupted"
+"""Why fewer runs count where somebody wanted it so."""
 PLAIN = "odometer_reset"
 """What every observer has to beat."""
 _SHOWN = 8
@@ -45,7 +47,7 @@ class Choice(Readable):
     Args:
         scenario: that was played. rows: of the observers, the best first. benchmark: of the nominal run.
         disturbances: of the runs that count and of the harder ones. allowance: what a position may be off.
-        interrupted: whether somebody stopped it; fewer runs count then.
+        stopped: why fewer runs count, `INTERRUPTED` or what failed; empty where all do.
     """
 
     scenario: Scenario
@@ -53,7 +55,7 @@ class Choice(Readable):
     benchmark: ObserverBenchmark
     disturbances: Sequence[Disturbance]
     allowance: Allowance
-    interrupted: bool = False
+    stopped: str = ""
 
     @property
     def found(self) -> bool:
@@ -77,7 +79,8 @@ class Choice(Readable):
         if not self.found:
             return "no observer came through. " + "; ".join(f"{row.label}: {row.why_not()}" for row in self.rows)
         best = self.best
-        stopped = f"interrupted after {len(self.disturbances)} runs; so far: " if self.interrupted else ""
+        end = INTERRUPTED if self.stopped == INTERRUPTED else "cut short"
+        stopped = f"{end} after {len(self.disturbances)} runs; so far: " if self.stopped else ""
         if best.safe:
             text = f"use {best.label}" + ("" if best.certified else " (nothing certifies it for these gaps)")
         else:

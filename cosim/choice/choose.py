@@ -12,7 +12,7 @@ from typing import Any
 from cosim.choice.allowance import Allowance, UsedAllowance
 from cosim.choice.benchmark import ObserverBenchmark, benchmark_observers
 from cosim.choice.candidates import BenchmarkCandidate
-from cosim.choice.choice import Choice
+from cosim.choice.choice import INTERRUPTED, Choice
 from cosim.choice.disturbances import Disturbance, Journey, drawn
 from cosim.choice.ranking import NOTHING, Row, ranked
 from cosim.errors import RunError, ScenarioError
@@ -109,7 +109,7 @@ def choose(
 
     Raises:
         ScenarioError: an observer is unknown, none fits, or nothing says where the train truly is.
-        RunError: the run of the plant side failed. CosimError: the scenario cannot be set up.
+        RunError: the undisturbed run of the plant side failed. CosimError: the scenario cannot be set up.
     """
     if seeds < 0:
         raise ScenarioError(f"seeds must not be negative, got {seeds}.")
@@ -120,16 +120,16 @@ def choose(
     again = [_asked(nominal.candidates[score.name]) for score in nominal.scores if score.failure is None]
     trials = [Trial(scenario, again, granted, number, recorded=recorded) for number in range(1, seeds + 1)]
     trials.append(Trial(scenario, again, granted, seeds + 1, HARDER, recorded=recorded))
-    found, interrupted = [nominal], nominal.interrupted
+    found, stopped = [nominal], INTERRUPTED if nominal.interrupted else ""
     if again:
         _require_any(nominal)
-    if again and not interrupted:
-        others, interrupted = _tried(trials, workers, lambda done: report("disturbed", done + 1, total))
+    if again and not stopped:
+        others, stopped = _tried(trials, workers, lambda done: report("disturbed", done + 1, total))
         found += others
     rows = ranked([_row(scenario, score.name, found) for score in nominal.scores])
     done = tuple(benchmark.disturbance for benchmark in found)
     report("done", total, total)
-    return Choice(scenario, rows, nominal, done, granted, interrupted)
+    return Choice(scenario, rows, nominal, done, granted, stopped)
 
 
 def scenario_for_fmu(path: str | Path) -> Scenario:
@@ -156,25 +156,31 @@ def _asked(candidate: BenchmarkCandidate) -> Any:
     return model if model.stated is not None else str(candidate.table.label)
 
 
-def _tried(
-    trials: Sequence[Trial], workers: int, report: Callable[[int], None]
-) -> tuple[list[ObserverBenchmark], bool]:
-    """The scores of the trials, in their order, and whether somebody interrupted.
-
-    Raises:
-        RunError: one failed as a whole.
-    """
+def _tried(trials: Sequence[Trial], workers: int, report: Callable[[int], None]) -> tuple[list[ObserverBenchmark], str]:
+    """The scores of the trials, in their order, and why some are missing; empty where all are there."""
     found: dict[int, ObserverBenchmark] = {}
+    stopped = ""
     try:
         with make_executor(workers) as executor:
             for done in run_jobs(trials, executor, progress=lambda number, _all: report(number)):
-                if done.row is None and done.failure is not None:
-                    raise RunError(f"A disturbed run failed: {done.failure.reason}")
-                _require_any(done.row)
-                found[done.number] = done.row
+                failure = _failure(done)
+                stopped = stopped or failure
+                if not failure:
+                    found[done.number] = done.row
     except KeyboardInterrupt:
-        return [found[number] for number in sorted(found)], True
-    return [found[number] for number in sorted(found)], False
+        stopped = INTERRUPTED
+    return [found[number] for number in sorted(found)], stopped
+
+
+def _failure(done: Any) -> str:
+    """Why a disturbed run counts for no observer, in words; empty where it counts."""
+    if done.row is None and done.failure is not None:
+        return f"A disturbed run failed: {done.failure.reason}"
+    try:
+        _require_any(done.row)
+    except RunError as error:
+        return str(error)
+    return ""
 
 
 def _require_any(benchmark: ObserverBenchmark) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.choice.allowance import Allowance
-from cosim.choice.choice import Choice
+from cosim.choice.choice import INTERRUPTED, Choice
 from cosim.choice.choose import SEEDS, choose, scenario_for_fmu
 from cosim.cli.arguments import QUIET, settings_argument
 from cosim.cli.output import print_warning
@@ -82,12 +82,20 @@ def execute(options: argparse.Namespace) -> Output:
     with ProgressBar("run", silent=options.quiet or options.json) as bar:
         choice = _chosen(options, bar)
     files: dict[str, Path] = {}
-    if options.write is not None and choice.found and not choice.interrupted:
+    if options.write is not None and choice.found and not choice.stopped:
         files["scenario"] = choice.with_best().save(options.write)
     if options.out is not None:
         files |= choice.write(options.out)
-    nothing = None if choice.found else RunError(choice.answer)
-    return Output(choice.parts(), choice.to_data(), files, error=KeyboardInterrupt() if choice.interrupted else nothing)
+    return Output(choice.parts(), choice.to_data(), files, error=_error(choice))
+
+
+def _error(choice: Choice) -> BaseException | None:
+    """Why there is no whole answer."""
+    if choice.stopped == INTERRUPTED:
+        return KeyboardInterrupt()
+    if choice.stopped:
+        return RunError(choice.stopped)
+    return None if choice.found else RunError(choice.answer)
 
 
 def _chosen(options: argparse.Namespace, bar: ProgressBar) -> Choice:

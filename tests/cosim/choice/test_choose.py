@@ -11,8 +11,8 @@ from small_scenarios import small
 
 import fmu_observer
 from cosim import Scenario
-from cosim.choice.choice import Choice
-from cosim.choice.choose import choose, scenario_for_fmu
+from cosim.choice.choice import INTERRUPTED, Choice
+from cosim.choice.choose import Trial, choose, scenario_for_fmu
 from cosim.errors import RunError, ScenarioError
 from fmus.cache import cached_fmu
 from plant_models import PLANTS
@@ -86,7 +86,23 @@ def test_a_single_row_is_no_run_to_be_evaluated() -> None:
 
 
 def test_an_answer_from_fewer_runs_begins_with_it(choice: Choice) -> None:
-    assert replace(choice, interrupted=True).answer.startswith("interrupted after 4 runs; so far: use ")
+    assert replace(choice, stopped=INTERRUPTED).answer.startswith("interrupted after 4 runs; so far: use ")
+
+
+def test_a_disturbed_run_that_fails_leaves_what_the_others_gave(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A plant may crash on one seed: the choice from the other runs is kept, and says what is missing."""
+    played = Trial.played
+
+    def failing(trial: Trial, **more: Any) -> Any:
+        if trial.number == 1:
+            raise RunError("plant: the process that ran it has ended")
+        return played(trial, **more)
+
+    monkeypatch.setattr(Trial, "played", failing)
+    found = choose(small(), ["odometer_reset"], seeds=2)
+    assert [d.name for d in found.disturbances] == ["nominal", "seed 2", "harder 3"]
+    assert found.stopped == "A disturbed run failed: plant: the process that ran it has ended"
+    assert found.answer.startswith("cut short after 3 runs; so far: use odometer_reset")
 
 
 def test_what_a_run_will_say_of_the_preset_is_said_with_the_answer() -> None:
