@@ -21,40 +21,41 @@ from fmus.cli.commands import find_commands
 from fmus.cli.output import Output
 from fmus.tables.table import Table
 
-# words behind the name of the program; a name in capitals is a file that `files` makes
+# Words behind the name of the program. A name in capitals is a file that `files` makes. OUT is what the line writes:
+# a name of its own for each line, since they run in any order.
 LINES = {
     "cosim": {
         "baseline make": "baseline make TRAIN OUT.json --quiet",
-        "baseline check": "baseline check BASE.json --quiet --verbose --plots OUT_pages",
+        "baseline check": "baseline check BASE.json --quiet --verbose --plots OUT",
         "baseline show": "baseline show BASE.json",
         "baseline update": "baseline update BASE.json --quiet",
         "baseline embed": "baseline embed FMUBASE.json LAG.fmu -o OUT.fmu",
-        "baseline extract": "baseline extract HOLDS.fmu OUT_taken.json",
+        "baseline extract": "baseline extract HOLDS.fmu OUT.json",
         "calibrate": "calibrate running_resistance RESULTS --signals speed=locomotive.speed --set minimum_speed=0.1",
         "certify": "certify takagi_sugeno_cdo --no-simulation",
         "certify of a scenario": "certify TRAIN",
-        "choose": "choose TRAIN --observers takagi_sugeno_cdo,multirate_cdo --seeds 1 --out OUT_page",
-        "compare": "compare RESULTS OTHER --verbose --html OUT.html --plots OUT_pictures",
+        "choose": "choose TRAIN --observers takagi_sugeno_cdo,multirate_cdo --seeds 1 --out OUT",
+        "compare": "compare RESULTS OTHER --verbose --html OUT.html --plots OUT",
         "export of a result": "export RESULTS OUT.npy",
         "export of a scenario": "export TRAIN OUT.ssp",
-        "export of a trajectory": "export RESULTS OUT_way.csv --trajectory --odometer odometer.reading",
+        "export of a trajectory": "export RESULTS OUT.csv --trajectory --odometer odometer.reading",
         "info of a model": "info locomotive",
         "info of an FMU": "info LAG.fmu",
         "linearise": "linearise takagi_sugeno_cdo",
         "list": "list",
-        "open": "open OTHER --no-browser --out OUT_other.html",
-        "new": "new LAG.fmu -o OUT_new.toml",
-        "report": "report RESULTS --out OUT_report.html",
-        "rerun": "rerun RESULTS --quiet --out OUT_again",
-        "run": "run TRAIN --quiet --out OUT_run --seeds 2",
+        "open": "open OTHER --no-browser --out OUT.html",
+        "new": "new LAG.fmu -o OUT.toml",
+        "report": "report RESULTS --out OUT.html",
+        "rerun": "rerun RESULTS --quiet --out OUT",
+        "run": "run TRAIN --quiet --out OUT --seeds 2",
         "show": "show TRAIN --picture OUT.svg",
-        "sweep": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --quiet --out OUT_sweep",
-        "tune": "tune TRAIN --observer multirate_cdo --parameters theta_2=1:3 --iterations 1 --quiet --out OUT_t",
-        "sweep by": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --by locomotive.mass --quiet --out OUT_by",
+        "sweep": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --quiet --out OUT",
+        "tune": "tune TRAIN --observer multirate_cdo --parameters theta_2=1:3 --iterations 1 --quiet --out OUT",
+        "sweep by": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --by locomotive.mass --quiet --out OUT",
     },
     "fmus": {
-        "build": "build driver -o OUT_built",
-        "check": "check LAG.fmu -o OUT_check.json",
+        "build": "build driver -o OUT",
+        "check": "check LAG.fmu -o OUT.json",
         "info": "info LAG.fmu",
         "list": "list",
     },
@@ -106,7 +107,8 @@ def output(
 ) -> Output:
     key = request.param
     if key not in outputs:
-        words = [word.replace("TRAIN", "TRAIN.toml") for word in LINES[key[0]][key[1]].split()]
+        own = "OUT_" + "_".join(key).replace(" ", "_")
+        words = [word.replace("TRAIN", "TRAIN.toml").replace("OUT", own) for word in LINES[key[0]][key[1]].split()]
         if any(word.isupper() or word.partition(".")[0].isupper() for word in words):
             request.getfixturevalue("files")
         outputs[key] = output_of(key[0], words)
