@@ -1,5 +1,6 @@
-/* What a model exchange instance of FMI 2.0 and of FMI 3.0 does with the same words; included where `M` is its own type,
-   STATE(before, after) names a function for a state, FMI_STATE(, ) the type of one and FMI_BYTE that of its bytes. */
+/* What a model exchange instance of FMI 2.0 and of FMI 3.0 does with the same words; included where OWN is its own type, `M`
+   the instance as one, FMI the prefix of its functions and FUNCTIONS the file that lists them, STATE(before, after) names a
+   function for a state, FMI_STATE(, ) the type of one and FMI_BYTE that of its bytes. */
 #ifndef EXCHANGE_CALLS_H
 #define EXCHANGE_CALLS_H
 
@@ -62,12 +63,20 @@ static int try_restore(Model *model, const char *bytes, size_t size) {
     return status;
 }
 
-/* The calls of the instance. */
 #define CALLS                                                                                                                \
     (Model) {                                                                                                                \
         enter_initialization, exit_initialization, set_reals, announce, update, enter_event_mode, enter_continuous_time_mode, \
             set_time, set_states, get_states, get_derivatives, get_indicators, directional, do_step, save, try_restore,      \
             close_model                                                                                                      \
     }
+
+/* The calls of the instance, and its functions from the library. */
+static void load(OWN *m, const char *library) {
+    m->model = CALLS;
+    void *handle = load_library(library);
+#define FUNCTION(name) find_function(handle, FMI #name, &m->name);
+#include FUNCTIONS
+#undef FUNCTION
+}
 
 #endif

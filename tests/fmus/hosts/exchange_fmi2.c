@@ -19,12 +19,6 @@ typedef struct {
 
 #define M ((Model2 *)model)
 
-#define STATE(before, after) before##FMUstate##after
-#define FMI_STATE(before, after) fmi2##before##FMUstate##after
-#define DESERIALIZE DeSerializeFMUstate
-#define FMI_BYTE char
-#include "exchange_calls.h"
-
 static void log_message(void *environment, const char *instance, fmi2Status status, const char *category, const char *message, ...) {
     (void)environment, (void)category;
     fprintf(stderr, "%s [%d]: %s\n", instance, (int)status, message);
@@ -64,13 +58,18 @@ static int do_step(Model *model, double t, double h) {
     return (int)M->DoStep(M->c, t, h, fmi2True);
 }
 
+#define OWN Model2
+#define FMI "fmi2"
+#define FUNCTIONS "exchange_functions_fmi2.h"
+#define STATE(before, after) before##FMUstate##after
+#define FMI_STATE(before, after) fmi2##before##FMUstate##after
+#define DESERIALIZE DeSerializeFMUstate
+#define FMI_BYTE char
+#include "exchange_calls.h"
+
 Model *open_model2(const char *name, const char *library, const char *token, const char *resources) {
     Model2 *m = calloc(1, sizeof *m);
-    m->model = CALLS;
-    void *handle = load_library(library);
-#define FUNCTION(name) find_function(handle, "fmi2" #name, &m->name);
-#include "exchange_functions_fmi2.h"
-#undef FUNCTION
+    load(m, library);
     memcpy(&m->callbacks, &(fmi2CallbackFunctions){log_message, calloc, free, NULL, NULL}, sizeof m->callbacks);
     m->c = m->Instantiate(name, fmi2ModelExchange, token, resources, &m->callbacks, fmi2False, fmi2False);
     memset(&m->callbacks, 0, sizeof m->callbacks); /* an importer may have had it on its stack */

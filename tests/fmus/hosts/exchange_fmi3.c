@@ -17,12 +17,6 @@ typedef struct {
 
 #define M ((Model3 *)model)
 
-#define STATE(before, after) before##FMUState##after
-#define FMI_STATE(before, after) fmi3##before##FMUState##after
-#define DESERIALIZE DeserializeFMUState
-#define FMI_BYTE fmi3Byte
-#include "exchange_calls.h"
-
 static void log_message(void *environment, fmi3Status status, const char *category, const char *message) {
     (void)environment, (void)category;
     fprintf(stderr, "[%d]: %s\n", (int)status, message);
@@ -66,13 +60,18 @@ static int do_step(Model *model, double t, double h) {
     return (int)M->DoStep(M->c, t, h, fmi3True, &event, &terminate, &early, &last);
 }
 
+#define OWN Model3
+#define FMI "fmi3"
+#define FUNCTIONS "exchange_functions_fmi3.h"
+#define STATE(before, after) before##FMUState##after
+#define FMI_STATE(before, after) fmi3##before##FMUState##after
+#define DESERIALIZE DeserializeFMUState
+#define FMI_BYTE fmi3Byte
+#include "exchange_calls.h"
+
 Model *open_model3(const char *name, const char *library, const char *token, const char *resources) {
     Model3 *m = calloc(1, sizeof *m);
-    m->model = CALLS;
-    void *handle = load_library(library);
-#define FUNCTION(name) find_function(handle, "fmi3" #name, &m->name);
-#include "exchange_functions_fmi3.h"
-#undef FUNCTION
+    load(m, library);
     m->c = m->InstantiateModelExchange(name, token, resources, fmi3False, fmi3False, m, log_message);
     if (m->c != NULL)
         return &m->model;

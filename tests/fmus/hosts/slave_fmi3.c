@@ -41,26 +41,6 @@ static void exit_initialization(Slave *slave) {
         update_discrete_states(s);
 }
 
-static double get_real(Slave *slave, unsigned reference) {
-    double value;
-    require(slave, "fmi3GetFloat64", ((Slave3 *)slave)->GetFloat64(((Slave3 *)slave)->c, &reference, 1, &value, 1));
-    return value;
-}
-
-static void set_real(Slave *slave, unsigned reference, double value) {
-    require(slave, "fmi3SetFloat64", ((Slave3 *)slave)->SetFloat64(((Slave3 *)slave)->c, &reference, 1, &value, 1));
-}
-
-static int get_integer(Slave *slave, unsigned reference) {
-    fmi3Int32 value;
-    require(slave, "fmi3GetInt32", ((Slave3 *)slave)->GetInt32(((Slave3 *)slave)->c, &reference, 1, &value, 1));
-    return value;
-}
-
-static void set_integer(Slave *slave, unsigned reference, int value) {
-    require(slave, "fmi3SetInt32", ((Slave3 *)slave)->SetInt32(((Slave3 *)slave)->c, &reference, 1, &value, 1));
-}
-
 static int do_step(Slave *slave, double t, double h) {
     Slave3 *s = (Slave3 *)slave;
     fmi3Boolean event, terminate, early;
@@ -78,70 +58,22 @@ static void notify(Slave *slave, unsigned clock, size_t count, const unsigned *r
     update_discrete_states(s);
 }
 
-static void *save(Slave *slave) {
-    fmi3FMUState state = NULL;
-    require(slave, "fmi3GetFMUState", ((Slave3 *)slave)->GetFMUState(((Slave3 *)slave)->c, &state));
-    return state;
-}
-
-static void restore(Slave *slave, void *state) {
-    require(slave, "fmi3SetFMUState", ((Slave3 *)slave)->SetFMUState(((Slave3 *)slave)->c, state));
-}
-
-static void forget(Slave *slave, void *state) {
-    require(slave, "fmi3FreeFMUState", ((Slave3 *)slave)->FreeFMUState(((Slave3 *)slave)->c, &state));
-}
-
-static size_t serialize(Slave *slave, void *state, char **bytes) {
-    Slave3 *s = (Slave3 *)slave;
-    size_t size;
-    require(slave, "fmi3SerializedFMUStateSize", s->SerializedFMUStateSize(s->c, state, &size));
-    *bytes = malloc(size);
-    require(slave, "fmi3SerializeFMUState", s->SerializeFMUState(s->c, state, (fmi3Byte *)*bytes, size));
-    return size;
-}
-
-static void *deserialize(Slave *slave, const char *bytes, size_t size) {
-    Slave3 *s = (Slave3 *)slave;
-    fmi3FMUState state = NULL;
-    require(slave, "fmi3DeserializeFMUState", s->DeserializeFMUState(s->c, (const fmi3Byte *)bytes, size, &state));
-    return state;
-}
-
-static int try_restore(Slave *slave, const char *bytes, size_t size) {
-    Slave3 *s = (Slave3 *)slave;
-    fmi3FMUState state = NULL;
-    int status = (int)s->DeserializeFMUState(s->c, (const fmi3Byte *)bytes, size, &state);
-    if (status > SLAVE_WARNING)
-        return status;
-    status = (int)s->SetFMUState(s->c, state);
-    require(slave, "fmi3FreeFMUState", s->FreeFMUState(s->c, &state));
-    return status;
-}
-
-static void reset(Slave *slave) {
-    require(slave, "fmi3Reset", ((Slave3 *)slave)->Reset(((Slave3 *)slave)->c));
-}
-
-static void terminate(Slave *slave) {
-    require(slave, "fmi3Terminate", ((Slave3 *)slave)->Terminate(((Slave3 *)slave)->c));
-}
-
-static void close_slave(Slave *slave) {
-    ((Slave3 *)slave)->FreeInstance(((Slave3 *)slave)->c);
-    free(slave);
-}
+#define OWN Slave3
+#define FMI "fmi3"
+#define FUNCTIONS "functions_fmi3.h"
+#define REAL Float64
+#define INTEGER Int32
+#define ONE(value) value, 1
+#define STATE(before, after) before##FMUState##after
+#define FMI_STATE(before, after) fmi3##before##FMUState##after
+#define DESERIALIZE DeserializeFMUState
+#define FMI_BYTE fmi3Byte
+#include "slave_calls.h"
 
 Slave *open_fmi3(const char *name, const char *library, const char *token, const char *resources, bool event_mode) {
     Slave3 *s = calloc(1, sizeof *s);
-    s->slave = (Slave){name, enter_initialization, exit_initialization, get_real, set_real, get_integer, set_integer, do_step,
-                       notify, save,                 restore,             forget,   serialize, deserialize, reset,      terminate,
-                       try_restore, close_slave};
+    load(s, name, library);
     s->event_mode = event_mode;
-    void *handle = load_library(library);
-#define FUNCTION(function) find_function(handle, "fmi3" #function, &s->function);
-#include "functions_fmi3.h"
-#undef FUNCTION
     s->c = s->InstantiateCoSimulation(name, token, resources, fmi3False, fmi3False, event_mode, fmi3False, NULL, 0, s, log_message, NULL);
     if (s->c != NULL)
         return &s->slave;
