@@ -12,13 +12,12 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import cosim.cli
 import fmus
-from cosim import Outcome, Scenario
+from cosim import Scenario
 from cosim.drawing.style import BLUE, TIME, TRUE_LINE, VERMILION, ZONE, new_figure, styled
 from plant_models import Locomotive
 
@@ -27,7 +26,8 @@ PICTURES = DOCS / "images" / "guide"
 FILE = re.compile(r"^```toml\n# (?P<name>[\w.]+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 sys.path.append(str(DOCS / "gallery"))
 
-import small_picture  # noqa: E402 - stands in a folder of scripts
+import shipped  # noqa: E402 - stands in a folder of scripts
+import small_picture  # noqa: E402
 
 
 def main(names: list[str]) -> None:
@@ -48,18 +48,6 @@ def unpack(page: Path, folder: Path) -> None:
         (folder / match["name"]).write_text(match["text"], encoding="utf-8")
     if "vendor.fmu" in page.read_text(encoding="utf-8"):
         fmus.build_fmu(Locomotive(), folder / "vendor.fmu", fmi_version=2)
-
-
-def ran(name: str, changes: Mapping[str, Any] | None = None) -> Outcome:
-    """Run a scenario file, quietly.
-
-    Raises:
-        RuntimeError: the run failed.
-    """
-    outcome = Scenario.load(name).run(overrides=changes, warn=lambda _text: None)
-    if outcome.failure is not None:
-        raise RuntimeError(outcome.failure)
-    return outcome
 
 
 def structure(path: Path) -> None:
@@ -85,7 +73,7 @@ def exact_and_stale(path: Path) -> None:
         ("stale", VERMILION, "used at the next communication point"),
         ("exact", BLUE, "used at its own instant"),
     ):
-        run = ran("line.toml", {**changes, "balises.timing": timing})
+        run = shipped.run("line.toml", {**changes, "balises.timing": timing})
         axes.plot(run["time"], run["observer.speed"] - run["train.speed"], color=colour, linewidth=1.0, label=words)
     axes.set(xlabel=TIME, ylabel="Speed error [m/s]", xlim=(20.0, 40.0), ylim=(-2.5, 2.5))
     axes.legend(loc="upper right")
@@ -95,7 +83,7 @@ def exact_and_stale(path: Path) -> None:
 @styled
 def jam(path: Path) -> None:
     """Speeds and position error while the wheel of the odometer spins and locks."""
-    run = ran("jam.toml")
+    run = shipped.run("jam.toml")
     figure = new_figure((7.0, 4.0))
     above, below = figure.subplots(2, 1, sharex=True)
     above.plot(run["time"], run["train.speed"], label="train", **TRUE_LINE)
@@ -126,14 +114,14 @@ def spacings(path: Path) -> None:
 
 def page(path: Path) -> None:
     """The first screen of the page of the first run, as a browser shows it."""
-    photograph(ran("freight_profile_d").write("results")["report"], path)
+    photograph(shipped.run("freight_profile_d").write("results")["report"], path)
 
 
 def comparison(path: Path) -> None:
     """The first screen of the page that compares the first run with that of the printed gains."""
     changed = {"stop": 30.0, "takagi_sugeno_cdo.preset": "as_published"}
     for name, changes in (("first", {"stop": 30.0}), ("published", changed)):
-        ran("freight_profile_d", changes).write(f"results/{name}", report=False)
+        shipped.run("freight_profile_d", changes).write(f"results/{name}", report=False)
     cosim.cli.main(["compare", "results/first", "results/published", "--html", "comparison.html", "--quiet"])
     photograph(Path("comparison.html"), path)
 

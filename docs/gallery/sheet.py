@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Iterable
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -68,16 +69,17 @@ class Sheet:
             raise ValueError(f"{self.name}: {quantity}: measured {number}, {beside}; give the reason.")
         self.lines.append(line)
 
-    def finish(self, figure: Any = None, *axes: Any, fontsize: float = 8.0) -> None:
+    def finish(self, figure: Any = None, *axes: Any, grids: Iterable[Any] = (), fontsize: float = 8.0) -> None:
         """Print the table and write both files.
 
         Args:
             figure: a matplotlib figure, or None for a table alone. axes: those of its axes that get a light grid and a
-            legend. fontsize: of the legends [pt].
+            legend. grids: further ones that get the grid alone. fontsize: of the legends [pt].
         """
         for axis in axes:
-            axis.grid(alpha=0.3)
             axis.legend(fontsize=fontsize)
+        for axis in (*axes, *grids):
+            axis.grid(alpha=0.3)
         self.out.mkdir(parents=True, exist_ok=True)
         print(f"{self.title} ({self.source})\n\n{sheet_text(self.lines)}")
         content = {"title": self.title, "source": self.source, "figure": figure is not None}

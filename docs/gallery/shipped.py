@@ -1,4 +1,4 @@
-"""Running a shipped scenario from a script of the gallery."""
+"""Running a scenario from a script, quietly."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cosim import Outcome, Scenario
 
 
 def run(name: str, changes: Mapping[str, Any] | None = None) -> Outcome:
-    """Run a shipped scenario.
+    """Run a shipped scenario, or one in a file.
 
     Raises:
         RuntimeError: the run failed.

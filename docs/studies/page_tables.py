@@ -4,7 +4,24 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+
+
+def print_tables(page: Path, tables: Mapping[str, str]) -> None:
+    """Print tables, and with ``--write`` on the command line put them into their parts of a page, a blank line around
+    each.
+
+    Args:
+        page: file. tables: by name of the part.
+
+    Raises:
+        SystemExit: as of `write_table`.
+    """
+    for name, text in tables.items():
+        print(text, end="\n\n")
+        if "--write" in sys.argv:
+            write_table(page, name, f"\n{text}\n")
 
 
 def write_table(page: Path, name: str, text: str) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from page_tables import write_table
+from page_tables import print_tables
 from train_diagnosis_runs import (
     INSIDE,
     OUTSIDE,
@@ -370,11 +370,7 @@ def tables(seeds: int = SEEDS, members: int = FAULTY) -> dict[str, str]:
 
 def main() -> None:
     """Print the tables, or write them into the page."""
-    found = tables()
-    for name, table in found.items():
-        print(table, end="\n\n")
-        if "--write" in sys.argv:
-            write_table(PAGE, name, f"\n{table}\n")
+    print_tables(PAGE, tables())
 
 
 if __name__ == "__main__":

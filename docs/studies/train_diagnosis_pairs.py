@@ -16,7 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from page_tables import write_table
+from page_tables import print_tables
 from train_diagnosis import PER_HOUR, SHARED, residual_recordings
 from train_diagnosis_runs import INSIDE, PERIOD, Journey, balise_places, diagnosed, recorded, sensed
 from turned_faults import Error
@@ -211,11 +211,7 @@ def humming(read: dict[str, np.ndarray], colour: float | None, seed: int) -> dic
 def main() -> None:
     """Print the tables, or write them into the page."""
     dry, wet, inside = ([recorded(journey) for journey in journeys] for journeys in (DRY, WET, INSIDE))
-    tables = {"coloured": free_table(dry, wet, inside), "pairs": fault_table(dry, wet)}
-    for name, text in tables.items():
-        print(text, end="\n\n")
-        if "--write" in sys.argv:
-            write_table(PAGE, name, f"\n{text}\n")
+    print_tables(PAGE, {"coloured": free_table(dry, wet, inside), "pairs": fault_table(dry, wet)})
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from page_tables import write_table
+from page_tables import print_tables
 
 from fmu_observer.detection.train_isolation import SENSORS, isolability
 
@@ -108,10 +108,7 @@ def _reported(others: tuple[str, ...] | None) -> str:
 
 def main() -> None:
     """Print the table, or write it into the page."""
-    table = comparison_table()
-    print(table)
-    if "--write" in sys.argv:
-        write_table(PAGE, "isolability", f"\n{table}\n")
+    print_tables(PAGE, {"isolability": comparison_table()})
 
 
 if __name__ == "__main__":

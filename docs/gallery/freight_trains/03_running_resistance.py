@@ -23,8 +23,7 @@ def main() -> None:
     figure, axis = plt.subplots(figsize=(6, 4), layout="constrained")
     axis.plot(3.6 * speeds, (davis.a + davis.b * speeds + davis.c * speeds**2) / 1e3)
     axis.set(xlabel="speed [km/h]", ylabel="running resistance [kN]")
-    axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, grids=[axis])
 
 
 if __name__ == "__main__":

@@ -77,10 +77,8 @@ def main() -> None:
                 sheet.add(f"error after {end:g} s, {name}{where}", "1", None, value, why, repeats=0.05)
             axis.semilogy(t, np.maximum(size, SMALL), lw=0.9, label=name)
         axis.set(title=f"samples {words}", xlabel="time [s]")
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=7)
     axes[0].set_ylabel("norm of the error in rad and rad/s")
-    sheet.finish(figure)
+    sheet.finish(figure, *axes, fontsize=7)
 
 
 if __name__ == "__main__":

@@ -66,10 +66,8 @@ def main() -> None:
             )
             axis.semilogy(t[::5], np.clip(error[::5], 1e-5, 1e4), lw=0.7, label=label)
         axis.set(title=f"{spacing:g} m", xlabel="time [s]")
-        axis.grid(alpha=0.3)
     axes[0].set_ylabel("speed error [m/s]")
-    axes[0].legend(fontsize=7)
-    sheet.finish(figure)
+    sheet.finish(figure, axes[0], grids=axes[1:], fontsize=7)
 
 
 if __name__ == "__main__":

@@ -57,9 +57,7 @@ def main() -> None:
     axes[1].set(xlabel="length of the jam [s]", ylabel="||r|| / ||f|| over gamma [1]")
     for axis in axes:
         axis.axhline(1.0, color="k", ls="--", lw=0.8, label="printed gamma")
-        axis.grid(alpha=0.3)
-    axes[0].legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axes[0], grids=axes[1:])
 
 
 def problem_of(design: QuasiLpvDesign) -> ResidualProblem:

@@ -73,10 +73,7 @@ def main() -> None:
     for i, name in enumerate(("v", "d", "d'")):
         axes[1].loglog(RATES, [abs(design.gains[0, i, 0]) for design in family.values()], "o-", ms=3, label=name)
     axes[1].set(xlabel="decay rate [1/s]", ylabel="size of the gain [SI]")
-    axes[1].legend(fontsize=8)
-    for axis in axes:
-        axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, axes[1], grids=axes[:1])
 
 
 def as_printed(sheet: Sheet) -> None:

@@ -63,10 +63,7 @@ def main() -> None:
     axes[1].plot(times, plan.speed(times), label="speed [m/s]")
     axes[1].plot(times, plan.position(times), label="position [m]")
     axes[1].set(xlabel="time [s]", title="30 m/s, 100 m")
-    axes[1].legend(fontsize=8)
-    for axis in axes:
-        axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, axes[1], grids=axes[:1])
 
 
 if __name__ == "__main__":

@@ -44,8 +44,7 @@ def main() -> None:
         axis.axhline(threshold, color="grey", ls=":", lw=0.8)
         axis.text(300.0, threshold, label, ha="right", va="bottom", fontsize=8)
     axis.set(xlabel="time since the brake was lost [ms]", ylabel="|residual| [mm/s]")
-    axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, grids=[axis])
 
 
 if __name__ == "__main__":

@@ -69,10 +69,7 @@ def main() -> None:
     axes[1].axhline(np.linalg.norm(START), color="grey", lw=0.8, label="|e(t_k)|")
     axes[1].axvline(cycle.next_start(START, 1.4), color="k", ls="--", lw=0.8, label="usable dwell time, m = 1.4")
     axes[1].set(xlabel="time [s]", ylabel="size of the error")
-    axes[1].legend(fontsize=8)
-    for axis in axes:
-        axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, axes[1], grids=axes[:1])
 
 
 if __name__ == "__main__":

@@ -55,8 +55,7 @@ def main() -> None:
     axis.boxplot(list(found.values()), orientation="horizontal", whis=(0, 100))
     axis.set_yticks(range(1, len(found) + 1), [labels[name] for name in found])
     axis.set(xlabel=f"largest error at the end of a gap [m], {len(SEEDS)} seeds", xscale="log")
-    axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, grids=[axis])
 
 
 if __name__ == "__main__":

@@ -54,8 +54,7 @@ def main() -> None:
     axis.set_xticks(range(len(PUBLISHED)), list(PUBLISHED), rotation=45, ha="right")
     axis.set(ylabel="largest error before a balise [coaches of 30 m]")
     axis.set_title("odometer (orange), observer (blue); x: published, of other jams", fontsize=9)
-    axis.grid(alpha=0.3)
-    sheet.finish(figure)
+    sheet.finish(figure, grids=[axis])
 
 
 if __name__ == "__main__":

@@ -66,9 +66,7 @@ def main() -> None:
         sheet.add(f"share of the quick signal, {protocol}", "1", None, float(np.mean(senders == 0)), OURS)
         axis.plot(times, found, label=["3 sin 2t", "sin 0.4t"], drawstyle="steps-post", lw=0.9)
         axis.set(title=protocol, xlabel="time [s]", ylabel="network error after a transmission")
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, *axes)
 
 
 if __name__ == "__main__":

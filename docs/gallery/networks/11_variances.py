@@ -129,10 +129,8 @@ def main() -> None:
             line = axis.semilogy(DELAYS, amplified[:, j, i], label=f"interval {interval:g} s")[0]
             axis.semilogy(DELAYS, [AMPLIFIED[i + 1, d][j] for d in DELAYS], "x", color=line.get_color())
         axis.set(title=f"x{i + 1}", xlabel="delay [s]")
-        axis.grid(alpha=0.3)
     axes[0].set_ylabel("A_var (crosses: published)")
-    axes[0].legend(fontsize=8)
-    sheet.finish(figure)
+    sheet.finish(figure, axes[0], grids=axes[1:])
 
 
 if __name__ == "__main__":

@@ -49,10 +49,8 @@ def main() -> None:
                 )
             axis.plot(times[times < 40.0], found[times < 40.0, 0], lw=0.8, label=decay)
         axis.set(title=f"error of x1, samples every {period:g} s", xlabel="time [s]", ylim=(-3.0, 3.0))
-        axis.grid(alpha=0.3)
-        axis.legend(fontsize=8)
     sheet.add("printed gains, constant, every 0.15 s", "", None, _bounded("constant", 0.15, "printed"), SHORT)
-    sheet.finish(figure)
+    sheet.finish(figure, *axes)
 
 
 def _bounded(decay: str, period: float, gains: str = "repaired") -> str:
