@@ -120,31 +120,7 @@ def _ordered_group(
     return Group(ordered, is_loop, tuple(loops), tuple(maybe), knots)
 
 
-def _execution_order(
-    components: Mapping[str, Component],
-    connections: Sequence[Connection],
-    before: Iterable[Pair] = (),
-    first: Iterable[str] = (),
-    last: Iterable[str] = (),
-) -> list[str]:
-    """Component names in Gauss-Seidel order, see `execution_groups`, for a master that does not iterate."""
-    _check_algebraic_loops(components, connections)
-    return [name for group in execution_groups(components, connections, before, first, last) for name in group.names]
-
-
-def _check_algebraic_loops(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
-    """Refuse cycles of declared direct feedthrough."""
-    loops = algebraic_loops(components, connections)
-    if loops:
-        raise CouplingError(
-            f"Algebraic loop without a method: {loops[0]}. Iterate it (master.algorithm = 'auto' or 'iterate'), break "
-            f"it with a "
-            "component that holds a state or a sample (for instance a sampled sensor), or merge the components."
-        )
-
-
-# -- order inside a group
-# -----------------------------------------------------------------------------------------------
+# -- order inside a group ------------------------------------------------------------------------------------------
 
 
 def _levels(components: Mapping[str, Component], connections: Sequence[Connection], must: set[Pair]) -> list[set[Pair]]:

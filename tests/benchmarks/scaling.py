@@ -24,7 +24,7 @@ from masters import c_loop
 
 from cosim import Scenario
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import _execution_order
+from cosim.coupling.graph import execution_groups
 from cosim.coupling.plan import make_plan
 from cosim.run.outcome import Outcome
 
@@ -106,8 +106,8 @@ def _parts(chain: Chain) -> dict[str, float]:
             component.instantiate()
         pairs = [(f"{source}.y", f"{target}.u") for source, target in chain.links]
         connections = timed("  connecting [ms]", lambda: connect(pairs, loaded))
-        order = timed("  order of execution [ms]", lambda: _execution_order(loaded, connections))
-        timed("  plan [ms]", lambda: make_plan(loaded, connections, order))
+        groups = timed("  order of execution [ms]", lambda: execution_groups(loaded, connections))
+        timed("  plan [ms]", lambda: make_plan(loaded, connections, [name for group in groups for name in group.names]))
     finally:
         for component in loaded.values():
             component.free()

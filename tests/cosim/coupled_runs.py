@@ -18,7 +18,7 @@ from cosim.balises.telegram import Channel
 from cosim.components.component import Component
 from cosim.components.loading import load_block
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import _execution_order
+from cosim.coupling.graph import execution_groups
 from cosim.coupling.plan import Plan, make_plan
 from cosim.master.axis import TimeAxis
 from cosim.master.interpolation.attach import attach_interpolators
@@ -114,13 +114,10 @@ class Listener(HybridSystem):
 
 
 @dataclass
-class Ran:
-    """What a run left behind."""
+class Recorded:
+    """What a run recorded."""
 
     table: np.ndarray
-    events: list[BaliseRecord]
-    master: Master
-    plan: Plan
 
     @property
     def time(self) -> np.ndarray:
@@ -128,6 +125,15 @@ class Ran:
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.table[name]
+
+
+@dataclass
+class Ran(Recorded):
+    """What a run left behind."""
+
+    events: list[BaliseRecord]
+    master: Master
+    plan: Plan
 
     def after(self, name: str) -> np.ndarray:
         """Values right after each telegram that was told to anybody, shape (telegrams,)."""
@@ -173,7 +179,7 @@ def prepare(
     by_name = {c.name: c for c in components}
     pairs = connect(connections, by_name)
     before = [] if balises is None else [(balises.plant, name) for name in balises.receivers]
-    order = order or _execution_order(by_name, pairs, before, ["plant"])
+    order = order or execution_order(by_name, pairs, before, ["plant"])
     for component in components:
         component.instantiate()
         for name, value in (starts or {}).get(component.name, {}).items():
@@ -183,6 +189,11 @@ def prepare(
         attach_interpolators(plan, inputs)
     service = None if balises is None else _service(plan, balises)
     return Master(plan, TimeAxis(start, h, count), service, **how)
+
+
+def execution_order(components: Mapping[str, Component], connections: Sequence[Any], *rules: Any) -> list[str]:
+    """Component names in Gauss-Seidel order; rules as of `execution_groups`."""
+    return [name for group in execution_groups(components, connections, *rules) for name in group.names]
 
 
 def _service(plan: Plan, balises: Balises) -> BaliseService:

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from coupled_runs import Balises, _service
+from coupled_runs import Balises, Recorded, _service, execution_order
 from mock_slaves import set_start
 
 from cosim.components.component import Component
 from cosim.components.loading import load_fmu
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import _execution_order
 from cosim.coupling.plan import Plan, make_plan
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.axis import TimeAxis
@@ -24,18 +23,10 @@ from cosim.master.master import Master, close
 
 
 @dataclass
-class EventRun:
+class EventRun(Recorded):
     """What a run left behind."""
 
-    table: np.ndarray
     master: Master
-
-    @property
-    def time(self) -> np.ndarray:
-        return self.table["time"]
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        return self.table[name]
 
     def jumps(self, name: str) -> list[float]:
         """The times at which a signal differs from the row before [s]."""
@@ -63,7 +54,7 @@ def prepare(
     clocks, pairs = connect_clocks([tuple(c.split(" -> ")) for c in connections], by_name)  # type: ignore[misc]
     connected = connect(pairs, by_name)
     before = [] if balises is None else [(balises.plant, name) for name in balises.receivers]
-    order = order or _execution_order(by_name, connected, before)
+    order = order or execution_order(by_name, connected, before)
     for component in components:
         component.instantiate()
         for name, value in (starts or {}).get(component.name, {}).items():

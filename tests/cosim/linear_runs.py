@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from coupled_runs import execution_order
 from test_fmus.masses import Chain, Cut
 
 from cosim.components.component import Component
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.loading import load_block, load_fmu
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import _execution_order
 from cosim.coupling.plan import Plan, make_plan
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
 from cosim.master.axis import TimeAxis
@@ -78,7 +78,7 @@ def prepare(
 ) -> tuple[Master, Mapping[str, str]]:
     """A master ready to run, and the interpolators of its lines."""
     pairs = connect([tuple(c.split(" -> ")) for c in connections], components)  # type: ignore[misc]
-    order = _execution_order(components, pairs)
+    order = execution_order(components, pairs)
     for name, component in components.items():
         if inputs != "hold" and isinstance(component, FMI3Component):
             component.request_intermediate_updates([c.target[1] for c in pairs if c.target[0] == name])

@@ -6,12 +6,13 @@ from itertools import pairwise, permutations
 from typing import Any, ClassVar
 
 import pytest
+from coupled_runs import execution_order
 from hypothesis import given
 from hypothesis import strategies as st
 from mock_slaves import Mock, component
 
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import Group, _execution_order, declared_feedthrough, execution_groups, undeclared
+from cosim.coupling.graph import Group, declared_feedthrough, execution_groups, undeclared
 from cosim.coupling.ordering import OrderedSignal, in_order, satisfied
 from cosim.coupling.strong import closed_path, strong_groups, topological
 from cosim.errors import CouplingError
@@ -30,7 +31,7 @@ class Direct(State):
 
 def order(slaves: dict[str, Mock], pairs: list[tuple[str, str]], before: Any = ()) -> list[str]:
     components = {n: component(s, n) for n, s in slaves.items()}
-    return _execution_order(components, connect([(f"{a}.y", f"{b}.u") for a, b in pairs], components), before)
+    return execution_order(components, connect([(f"{a}.y", f"{b}.u") for a, b in pairs], components), before)
 
 
 def test_a_source_comes_before_its_targets() -> None:
@@ -57,12 +58,16 @@ def test_further_pairs_hold_even_where_they_contradict_feedthrough() -> None:
         order(slaves, pairs, [("plant", "observer"), ("observer", "plant")])
 
 
+def loops(slaves: dict[str, Mock], pairs: list[tuple[str, str]]) -> list[str]:
+    """The algebraic loops in words."""
+    components = {name: component(slave, name) for name, slave in slaves.items()}
+    groups = execution_groups(components, connect([(f"{a}.y", f"{b}.u") for a, b in pairs], components))
+    return [str(loop) for group in groups for loop in group.algebraic]
+
+
 def test_an_algebraic_loop_is_named_with_its_signals() -> None:
     slaves = {"a": Direct(), "b": Direct(), "c": State(), "d": Direct()}
-    with pytest.raises(CouplingError) as error:
-        order(slaves, [("a", "b"), ("b", "a"), ("a", "c"), ("c", "d")])
-    text = str(error.value)
-    assert "Algebraic loop" in text
+    (text,) = loops(slaves, [("a", "b"), ("b", "a"), ("a", "c"), ("c", "d")])
     for name in ("a.u", "a.y", "b.u", "b.y"):
         assert name in text
     assert "c." not in text
@@ -70,9 +75,8 @@ def test_an_algebraic_loop_is_named_with_its_signals() -> None:
 
 
 def test_a_direct_output_on_its_own_input_is_a_loop() -> None:
-    with pytest.raises(CouplingError, match=r"a\.u -> a\.y -> a\.u|a\.y -> a\.u -> a\.y"):
-        order({"a": Direct()}, [("a", "a")])
-    assert order({"a": State()}, [("a", "a")]) == ["a"]
+    assert loops({"a": Direct()}, [("a", "a")]) in (["a.u -> a.y -> a.u"], ["a.y -> a.u -> a.y"])
+    assert loops({"a": State()}, [("a", "a")]) == []
 
 
 def test_declared_feedthrough_and_silence() -> None:
@@ -100,7 +104,7 @@ def test_acyclic_graphs_are_ordered_whatever_the_listing(case: tuple[int, list[i
     edges = [(k // n, k % n) for k in sorted(chosen) if k // n < k % n]
     components = {f"c{i}": component(Many(), f"c{i}") for i in listing}
     connections = connect([(f"c{a}.y", f"c{b}.u{a}") for a, b in edges], components)
-    found = _execution_order(components, connections)
+    found = execution_order(components, connections)
     assert sorted(found) == sorted(components)
     assert all(found.index(f"c{a}") < found.index(f"c{b}") for a, b in edges)
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from clocked_mocks import Planned
-from coupled_runs import Balises, Listener, Motion, _service, block, positions, prepare, ran, run
+from coupled_runs import Balises, Listener, Motion, _service, block, execution_order, positions, prepare, ran, run
 from event_runs import parts
 from fmpy.fmi1 import FMICallException
 from mock_slaves import DISCARD, FATAL, Counter, component
@@ -30,7 +30,7 @@ from cosim.balises.telegram import Channel, FalseTelegram
 from cosim.components.component import Component
 from cosim.coupling.clocks import connect_clocks
 from cosim.coupling.connection import connect
-from cosim.coupling.graph import _execution_order, execution_groups
+from cosim.coupling.graph import execution_groups
 from cosim.coupling.plan import make_plan
 from cosim.errors import CouplingError, RunError
 from cosim.master.algorithms.gauss_seidel import GaussSeidel
@@ -394,7 +394,7 @@ def everything(
     by_name = {c.name: c for c in components}
     clocks, pairs = connect_clocks([tuple(w.split(" -> ")) for w in wires], by_name)  # type: ignore[misc]
     connected = connect(pairs, by_name)
-    order = _execution_order(by_name, connected, [("plant", "listener")])
+    order = execution_order(by_name, connected, [("plant", "listener")])
     for c in components:
         c.instantiate()
     plan = make_plan(by_name, connected, order, None, clocks)
