@@ -161,19 +161,6 @@ class ExcessiveSlip(SlipIndicator):
         return np.where(self._level(x, u, p) == DEGRADED, np.abs(x.filtered_slip) - p.slip_threshold, 0.0)
 
 
-def speed_slip(odometer: Array, speed: Array, floor: Array) -> Array:
-    """Slip relative to the train speed, ``(r w - v) / max(|v|, floor)``: Bouchama 2024, (3.13), guarded.
-
-    Args:
-        odometer: wheel circumferential speed r w [m/s]. speed: train speed v [m/s].
-        floor: smallest denominator [m/s], > 0; at and below it the slip is relative to the floor.
-
-    Returns:
-        Slip ratio [1]; positive when the wheel runs ahead of a train that moves forward.
-    """
-    return (odometer - speed) / np.maximum(np.abs(speed), floor)
-
-
 def odometer_slip(odometer: Array, speed: Array, floor: Array) -> Array:
     """Slip relative to the odometer speed, ``(y - v) / max(|y|, floor)``: Bouchama 2024, (3.49) and (4.14), guarded.
 
@@ -187,15 +174,6 @@ def odometer_slip(odometer: Array, speed: Array, floor: Array) -> Array:
         Slip ratio [1]; at wheel lock ``-v / floor``.
     """
     return (odometer - speed) / np.maximum(np.abs(odometer), floor)
-
-
-def odometer_slip_from_speed_slip(speed_slip_ratio: Array) -> Array:
-    """(3.49) from (3.13): ``l / (1 + l)`` [1], for a turning wheel (l > -1) and speeds above the guards.
-
-    Args:
-        speed_slip_ratio: ``(r w - v) / v`` [1].
-    """
-    return speed_slip_ratio / (1.0 + speed_slip_ratio)
 
 
 def speed_slip_from_odometer_slip(odometer_slip_ratio: Array) -> Array:
