@@ -29,24 +29,11 @@ from cosim.master.interpolation.interpolators import MeanInterpolator
 from cosim.process.last_call import LAST_CALL
 from fmus.fmi.elements import Element
 from fmus.fmi.ports import is_native
-from fmus.fmi.types import c_type, getter_type, size
+from fmus.fmi.types import CTYPES, c_type, getter_type, size
 
-KINDS = (
-    "Float64",
-    "Float32",
-    "Int8",
-    "UInt8",
-    "Int16",
-    "UInt16",
-    "Int32",
-    "UInt32",
-    "Int64",
-    "UInt64",
-    "Boolean8",
-    "Boolean32",
-)
 FMI3 = 3
 EQUAL_TO = {"Real": "Float64", "Integer": "Int32"}
+KINDS = (*(kind for kind in CTYPES if kind not in EQUAL_TO), "Boolean8", "Boolean32")  # the order of ``stepper.h``
 
 
 class Stop(IntEnum):

@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from multiprocessing import spawn
 from multiprocessing.connection import Pipe, wait
 from pathlib import Path
@@ -42,7 +42,7 @@ _FROM_OUTSIDE = {-signal.SIGTERM, -signal.SIGINT} | ({-signal.SIGKILL} if hasatt
 """Exit codes of processes that were ended by somebody else, perhaps by the system for want of memory."""
 
 
-class Team:
+class Team(AbstractContextManager["Team"]):
     """Processes that stay for several rounds of jobs; each is started when it is first needed, and replaced when it
     dies.
 
@@ -104,9 +104,6 @@ class Team:
         """Let all processes end."""
         while self._idle:
             self._idle.pop().stop()
-
-    def __enter__(self) -> Team:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

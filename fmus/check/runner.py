@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from time import perf_counter
 from typing import Any
 
@@ -24,7 +25,7 @@ _READ_AT_MOST = 200
 """Local variables that are read where there is no output."""
 
 
-class Runner:
+class Runner(AbstractContextManager["Runner"]):
     """One probe under way: an instance, its outputs and the inputs that excite it.
 
     Args:
@@ -78,9 +79,6 @@ class Runner:
         """End and free the instance."""
         self.component.terminate()
         self.component.free()
-
-    def __enter__(self) -> Runner:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.put_away()

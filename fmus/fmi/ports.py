@@ -61,8 +61,7 @@ def make_port(
     if not groups:
         return _nothing
     if is_native(slave):
-        make = _native_reader if verb == "Get" else _native_writer
-        return _sequence([make(slave, fmi_version, group, values) for group in groups])
+        return _sequence([_native_transfer(slave, fmi_version, verb, group, values) for group in groups])
     prepare = getattr(slave, f"prepared_{verb.lower()}", None)
     if (
         prepare is not None
@@ -122,44 +121,27 @@ def _straight(values: np.ndarray, group: _Group) -> Any:
     return values[group.index].ctypes.data_as(ctypes.POINTER(ctypes.c_double))  # keeps the array alive
 
 
-def _native_reader(slave: Any, fmi_version: int, group: _Group, values: np.ndarray) -> Callable[[], None]:
+def _native_transfer(slave: Any, fmi_version: int, verb: Verb, group: _Group, values: np.ndarray) -> Callable[[], None]:
+    called = (slave, fmi_version, verb, group.kind, group.references)
     pointer = _straight(values, group)
     if pointer is not None:
-        return native_call(slave, fmi_version, "Get", group.kind, group.references, pointer, group.total)
-    kind, _, dtype = c_type(group.kind, fmi_version)
+        return native_call(*called, pointer, group.total)
+    kind, letter, dtype = c_type(group.kind, fmi_version)
     raw = (kind * group.total)()
+    call, index = native_call(*called, raw, group.total), group.index
     seen: np.ndarray = np.frombuffer(raw, dtype=dtype)
-    call, index, truth = (
-        native_call(slave, fmi_version, "Get", group.kind, group.references, raw, group.total),
-        group.index,
-        group.kind == "Boolean",
-    )
+    pack = struct.Struct(f"={group.total}{letter}").pack_into  # refuses what the type cannot hold; ctypes would wrap it
+    truth, cast = group.kind == "Boolean", _cast(group.kind)
 
     def read() -> None:
         call()
         values[index] = seen != 0 if truth else seen
 
-    return read
-
-
-def _native_writer(slave: Any, fmi_version: int, group: _Group, buffer: np.ndarray) -> Callable[[], None]:
-    pointer = _straight(buffer, group)
-    if pointer is not None:
-        return native_call(slave, fmi_version, "Set", group.kind, group.references, pointer, group.total)
-    kind, letter, _ = c_type(group.kind, fmi_version)
-    raw = (kind * group.total)()
-    pack = struct.Struct(f"={group.total}{letter}").pack_into  # refuses what the type cannot hold; ctypes would wrap it
-    call, index, cast = (
-        native_call(slave, fmi_version, "Set", group.kind, group.references, raw, group.total),
-        group.index,
-        _cast(group.kind),
-    )
-
     def write() -> None:
-        pack(raw, 0, *map(cast, buffer[index].tolist()))
+        pack(raw, 0, *map(cast, values[index].tolist()))
         call()
 
-    return write
+    return read if verb == "Get" else write
 
 
 def _cast(kind: str) -> Callable[[float], Any]:

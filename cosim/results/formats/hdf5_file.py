@@ -12,6 +12,7 @@ import io
 import json
 import math
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -35,7 +36,7 @@ CHUNK = 16384  # rows compressed together at most
 FEW = 256  # rows that are not worth it
 
 
-class _GuardedFile:
+class _GuardedFile(AbstractContextManager["_GuardedFile"]):
     """A new binary file to write and read back, for ``h5py.File``.
 
     Args:
@@ -109,9 +110,6 @@ class _GuardedFile:
 
     def flush(self) -> None:
         """Nothing is held back."""
-
-    def __enter__(self) -> _GuardedFile:
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -74,9 +74,13 @@ def solved_lower(L: Array, right: Array) -> Array:
     rows: list[Array] = []
     for i in range(L.shape[0]):
         known = right[i] if i == 0 else right[i] - L[i, :i] @ np.stack(rows)
-        pivot = np.where(L[i, i] > 0.0, L[i, i], 1.0)
-        rows.append(np.where(L[i, i] > 0.0, known / pivot, 0.0 * known))
+        rows.append(_over(known, L[i, i]))
     return np.stack(rows)
+
+
+def _over(known: Array, pivot: Array) -> Array:
+    """The quotient; zeros where the pivot is not positive."""
+    return np.where(pivot > 0.0, known / np.where(pivot > 0.0, pivot, 1.0), 0.0 * known)
 
 
 def predicted_factor(S: Array, F: Array, noise: Array) -> Array:
@@ -131,17 +135,9 @@ def corrected_by(x: Array, innovation: Array, noise: Array, seen: Array, spread:
 
 
 def _solved_lower_transposed(L: Array, right: Array) -> Array:
-    """``inv(L') right`` by backward substitution; a row of zeros in L gives zeros.
-
-    Args:
-        L: lower triangular, shape (q, q). right: shape (q, k).
-
-    Returns:
-        Shape (q, k).
-    """
+    """``inv(L') right`` by backward substitution, else as `solved_lower`."""
     rows: list[Array] = []
     for i in reversed(range(L.shape[0])):
         known = right[i] if not rows else right[i] - L[i + 1 :, i] @ np.stack(rows)
-        pivot = np.where(L[i, i] > 0.0, L[i, i], 1.0)
-        rows.insert(0, np.where(L[i, i] > 0.0, known / pivot, 0.0 * known))
+        rows.insert(0, _over(known, L[i, i]))
     return np.stack(rows)
