@@ -157,9 +157,7 @@ def extended() -> Callable[[np.ndarray], None]:
     return step
 
 
-def unscented() -> Callable[[np.ndarray], None]:
-    points = filterpy.kalman.MerweScaledSigmaPoints(4, 0.1, 2.0, 0.0)
-    theirs = filterpy.kalman.UnscentedKalmanFilter(4, 2, T, lambda x: x[:2], moved, points)
+def _stepped(theirs: Any) -> Callable[[np.ndarray], None]:
     theirs.Q, theirs.R = 1e-3 * np.eye(4), 0.1 * np.eye(2)
 
     def step(reading: np.ndarray) -> None:
@@ -167,17 +165,17 @@ def unscented() -> Callable[[np.ndarray], None]:
         theirs.update(reading)
 
     return step
+
+
+def unscented() -> Callable[[np.ndarray], None]:
+    points = filterpy.kalman.MerweScaledSigmaPoints(4, 0.1, 2.0, 0.0)
+    theirs = filterpy.kalman.UnscentedKalmanFilter(4, 2, T, lambda x: x[:2], moved, points)
+    return _stepped(theirs)
 
 
 def ensemble() -> Callable[[np.ndarray], None]:
     theirs = filterpy.kalman.EnsembleKalmanFilter(np.zeros(4), np.eye(4), 2, T, DRAWN, lambda x: x[:2], moved)
-    theirs.Q, theirs.R = 1e-3 * np.eye(4), 0.1 * np.eye(2)
-
-    def step(reading: np.ndarray) -> None:
-        theirs.predict()
-        theirs.update(reading)
-
-    return step
+    return _stepped(theirs)
 
 
 def train() -> Callable[[np.ndarray], None]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exchange_importer import INSTANCE, Exchange, description_of
+from exchange_importer import INSTANCE, Exchange, description_of, pass_initialization
 from fmpy import extract
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
@@ -319,12 +319,7 @@ class Component:
 
     def initialize(self, start_time: float = 0.0, **starts: float) -> None:
         self.set(**starts)
-        if self.version == 2:
-            self.slave.setupExperiment(startTime=start_time)
-            self.slave.enterInitializationMode()
-        else:
-            self.slave.enterInitializationMode(startTime=start_time)
-        self.slave.exitInitializationMode()
+        pass_initialization(self.slave, self.version, start_time)
         if self.event_mode:
             self.slave.enterStepMode()
 
@@ -447,22 +442,31 @@ def archive(system: str | HybridSystem | Path, version: int, protocol: EventProt
     return cached_fmu(made, version, protocol=protocol or EventProtocol())  # type: ignore[arg-type]
 
 
+def kept(make: Callable[..., Any], free: Callable[[Any], None]) -> Iterator[Callable[..., Any]]:
+    """A fixture that makes things, and frees them at the end."""
+    alive: list[Any] = []
+
+    def made(*arguments: Any, **keywords: Any) -> Any:
+        alive.append(make(*arguments, **keywords))
+        return alive[-1]
+
+    yield made
+    for one in alive:
+        free(one)
+
+
 @pytest.fixture
 def component(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Component]]:
     """Instances of FMUs, freed at the end: ``component(name, system or path, fmi_version)``; not yet initialised. With
     `counts`, one that is told of events by counts in FMI 3 too."""
-    alive: list[Component] = []
 
     def make(system: str | HybridSystem | Path, version: int, logging: bool = False, counts: bool = False) -> Component:
         fmu = archive(system, version, EventProtocol("counts" if counts else None))
         made = Component(fmu, unpacked(fmu))
         made.instantiate(logging)
-        alive.append(made)
         return made
 
-    yield make
-    for one in alive:
-        one.slave.freeInstance()
+    yield from kept(make, lambda one: one.slave.freeInstance())
 
 
 @pytest.fixture
@@ -476,17 +480,12 @@ def exchange(unpacked: Callable[[Path], Path]) -> Iterator[Callable[..., Exchang
     """Model exchange instances, freed at the end: ``exchange(name, system or path, fmi_version)``; not yet
     initialised.
     """
-    alive: list[Exchange] = []
 
     def make(system: str | HybridSystem | Path, version: int, logging: bool = False) -> Exchange:
         fmu = archive(system, version)
-        made = Exchange(fmu, unpacked(fmu), logging)
-        alive.append(made)
-        return made
+        return Exchange(fmu, unpacked(fmu), logging)
 
-    yield make
-    for one in alive:
-        one.model.freeInstance()
+    yield from kept(make, lambda one: one.model.freeInstance())
 
 
 @pytest.fixture

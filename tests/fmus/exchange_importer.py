@@ -54,6 +54,16 @@ def description_of(fmu: Path) -> ModelDescription:
     return read_model_description(str(fmu), validate=False)
 
 
+def pass_initialization(instance: Any, version: int, start_time: float) -> None:
+    """From instantiated to initialised, of either interface type."""
+    if version == 2:
+        instance.setupExperiment(startTime=start_time)
+        instance.enterInitializationMode()
+    else:
+        instance.enterInitializationMode(startTime=start_time)
+    instance.exitInitializationMode()
+
+
 class Exchange:
     """One model exchange instance, FMI 2 or FMI 3, driven by names; `log` holds its messages."""
 
@@ -87,12 +97,7 @@ class Exchange:
     def initialize(self, start_time: float = 0.0, **starts: float) -> Update:
         """To continuous-time mode."""
         self.set(**starts)
-        if self.version == 2:
-            self.model.setupExperiment(startTime=start_time)
-            self.model.enterInitializationMode()
-        else:
-            self.model.enterInitializationMode(startTime=start_time)
-        self.model.exitInitializationMode()
+        pass_initialization(self.model, self.version, start_time)
         update = self.update()
         self.model.enterContinuousTimeMode()
         return update

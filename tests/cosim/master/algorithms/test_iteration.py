@@ -396,6 +396,13 @@ def test_a_loop_without_solution_ends_the_run_with_its_history(method: str) -> N
     assert master.plan.values[0] == 0.0  # a guess gone astray is no result
 
 
+def fails(master: Master, words: str) -> None:
+    """The run ends with an error of these words."""
+    with pytest.raises(RunError, match=words):
+        master.run()
+    close(master.plan)
+
+
 def test_a_divergence_to_infinity_is_reported_as_such() -> None:
     class Explodes(Bent):
         def compute(self) -> None:
@@ -403,11 +410,7 @@ def test_a_divergence_to_infinity_is_reported_as_such() -> None:
                 self.v["y"] = float(np.float64(10.0) * self.time + np.float64(3.0) * np.float64(self.v["u"]) ** 3)
 
     master = prepare({"a": component(Explodes(), "a")}, ["a.y -> a.u"], 1.0, 5, by("fixed-point"))
-    with pytest.raises(
-        RunError, match=r"Loop of a at t = 1 s: \d sweeps by 'fixed-point' do not converge\. .*, inf\. Moving most"
-    ):
-        master.run()
-    close(master.plan)
+    fails(master, r"Loop of a at t = 1 s: \d sweeps by 'fixed-point' do not converge\. .*, inf\. Moving most")
 
 
 def test_a_member_that_fails_in_a_later_sweep_says_so() -> None:
@@ -420,11 +423,7 @@ def test_a_member_that_fails_in_a_later_sweep_says_so() -> None:
             self.v["y"] = 4.0 * self.v["u"] + self.time
 
     master = prepare({"a": component(Refuses(), "a")}, ["a.y -> a.u"], 0.6, 5, by("fixed-point"))
-    with pytest.raises(
-        RunError, match=r"doStep failed: input out of range \(In sweep 3 of the iteration of a; residuals so far: "
-    ):
-        master.run()
-    close(master.plan)
+    fails(master, r"doStep failed: input out of range \(In sweep 3 of the iteration of a; residuals so far: ")
 
 
 def test_a_member_that_is_broken_from_the_start_is_named_and_not_the_loop() -> None:
@@ -433,9 +432,7 @@ def test_a_member_that_is_broken_from_the_start_is_named_and_not_the_loop() -> N
             self.v["y"] = np.nan if self.time > 0.15 else 0.0
 
     master = prepare({"a": component(Odd(), "a")}, ["a.y -> a.u"], 0.1, 5)
-    with pytest.raises(RunError, match=r"Component 'a' at t = 0\.2 s: output a\.y is nan"):
-        master.run()
-    close(master.plan)
+    fails(master, r"Component 'a' at t = 0\.2 s: output a\.y is nan")
     assert master.recorder.count == 2
 
 
