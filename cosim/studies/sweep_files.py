@@ -46,15 +46,7 @@ def write_outcome(outcome: Outcome, settings: Mapping[str, Any], folder: Path, *
 
 
 def write_sweep(result: SweepRuns, directory: Path) -> dict[str, Path]:
-    """Write all runs that are in memory, the index and a page; paths by kind.
-
-    Args:
-        result: the runs.
-        directory: the folder; created where it does not exist.
-
-    Raises:
-        OutputError: the folder cannot be written.
-    """
+    """Write all runs that are in memory, the index and a page; else as `write_index`."""
     runs = list(result.runs)
     for place, run in enumerate(runs):
         if run.outcome is not None:

@@ -133,8 +133,8 @@ def first_order_residual(
     """``F{y - r} + tau s F{y}``, zero for ``tau y' = r - y``.
 
     Args:
-        coefficients: of `residual_filter`. memory: of the sample before, two numbers. measured: y. reference: r.
-        time_constant: tau of the actuator [s]. starts: see `second_order_residual`.
+        coefficients, memory, measured, reference, starts: as of `second_order_residual`. time_constant: tau of the
+            actuator [s].
 
     Returns:
         Residual in units of y, and the memory for the next sample.

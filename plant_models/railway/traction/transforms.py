@@ -129,10 +129,7 @@ def park(a: Array, b: Array, c: Array, angle: Array) -> Pair:
 
 
 def inverse_park(d: Array, q: Array, angle: Array) -> Triple:
-    """The rotor frame (d, q) to phases that add up to zero; the inverse of `park`.
-
-    Args:
-        d: component along d, in any unit. q: along q. angle: electrical angle of the rotor [rad].
+    """The rotor frame (d, q) to phases that add up to zero, arguments as of `to_stator`; the inverse of `park`.
 
     Returns:
         Quantities of the three phases, in the same unit.

@@ -89,8 +89,7 @@ def delay_findings(
     """Longest delay of an observer with predictors: (2.17) and (2.59), the roots of the linearised model, runs.
 
     Args:
-        observer: to evaluate. p: its parameters, as in `HybridSystem.flow`. named: the same by name. bounds: of Theorem
-            2.1.
+        observer, p, named, bounds: as of `packet_findings`.
     """
     count = observer.predictors
     what = f"delay, {count} predictor{'s' if count > 1 else ''}"
