@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
@@ -20,6 +21,7 @@ from cosim.run.outcome import Outcome
 from cosim.scenario.fmu_alone import FmuAlone
 from cosim.simulation.scenario import Scenario
 
+LOG = logging.getLogger("cosim")
 Progress = Callable[[float, float], None]
 
 
@@ -36,11 +38,11 @@ class Subject:
     outcome: Outcome | None = None
 
 
-def _run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable[[str], None] | None = None) -> Subject:
+def _run_recipe(recipe: Recipe, progress: Progress | None = None) -> Subject:
     """Run what a recipe says.
 
     Args:
-        recipe: of an FMU alone or of a scenario. progress, warn: as for `Scenario.run`.
+        recipe: of an FMU alone or of a scenario. progress: as for `Scenario.run`.
 
     Raises:
         BaselineError: it cannot be run again.
@@ -53,9 +55,9 @@ def _run_recipe(recipe: Recipe, progress: Progress | None = None, warn: Callable
         )
     if recipe.kind == "fmu":
         scenario = Scenario.fmu(recipe.source, **{f.name: getattr(recipe, f.name) for f in fields(FmuAlone)})
-        outcome = scenario.run(progress=progress, warn=_about_inputs(recipe, warn))
+        outcome = scenario.run(progress=progress, warn=_about_inputs(recipe))
     else:
-        outcome = Scenario.load(recipe.source).run(progress=progress, overrides=recipe.overrides, warn=warn)
+        outcome = Scenario.load(recipe.source).run(progress=progress, overrides=recipe.overrides)
     return Subject(recipe, outcome.result, outcome)
 
 
@@ -63,13 +65,12 @@ def run_again(
     baseline: Baseline,
     fmu: str | Path | None = None,
     progress: Progress | None = None,
-    warn: Callable[[str], None] | None = None,
 ) -> Subject:
     """Run what a baseline was made of.
 
     Args:
         baseline: the baseline; inputs that came with it out of an FMU are played back.
-        fmu: another FMU in place of its own, a new delivery, say. progress, warn: as for `Scenario.run`.
+        fmu: another FMU in place of its own, a new delivery, say. progress: as for `Scenario.run`.
 
     Raises:
         BaselineError: it cannot be run again.
@@ -79,11 +80,11 @@ def run_again(
     stimuli = baseline.more.get("stimuli")
     if stimuli is None or recipe.inputs:
         with after_its_delivery(baseline.path, recipe.source):
-            return _run_recipe(recipe, progress, warn)
+            return _run_recipe(recipe, progress)
     with TemporaryDirectory(prefix="fmu-reference-") as folder:
         table = Path(folder) / "inputs.csv"
         table.write_bytes(stimuli)
-        return _run_recipe(replace(recipe, inputs=str(table)), progress, warn)
+        return _run_recipe(replace(recipe, inputs=str(table)), progress)
 
 
 @contextmanager
@@ -124,7 +125,6 @@ def make_subject(
     *,
     overrides: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
-    warn: Callable[[str], None] | None = None,
     **run: Any,
 ) -> Subject:
     """Run what a user named.
@@ -133,7 +133,7 @@ def make_subject(
         what: path of an FMU; name or path of a scenario; a `Scenario`; an `Outcome` or `Result` of a run made already.
         folder: where relative paths start.
         overrides: of a scenario, as for `Scenario.set`.
-        progress, warn: as for `Scenario.run`.
+        progress: as for `Scenario.run`.
         run: start, stop and step of the run [s]; of an FMU alone all that `FmuAlone` holds.
 
     Raises:
@@ -149,9 +149,9 @@ def make_subject(
         return Subject(Recipe(), what, None) if isinstance(what, Result) else Subject(Recipe(), what.result, what)
     if isinstance(what, str | Path) and Path(what).suffix.lower() == ".fmu":
         _refuse("an FMU alone", changed)
-        return _run_recipe(_fmu_recipe(what, folder, times, of_fmu), progress, warn)
+        return _run_recipe(_fmu_recipe(what, folder, times, of_fmu), progress)
     _refuse("a scenario", of_fmu)
-    return _scenario_subject(what, folder, {**times, **(overrides or {})}, progress, warn)
+    return _scenario_subject(what, folder, {**times, **(overrides or {})}, progress)
 
 
 def _fmu_recipe(what: str | Path, folder: Path, times: Mapping[str, Any], chosen: Mapping[str, Any]) -> Recipe:
@@ -174,14 +174,13 @@ def _scenario_subject(
     folder: Path,
     changes: Mapping[str, Any],
     progress: Progress | None,
-    warn: Callable[[str], None] | None,
 ) -> Subject:
     """A scenario, run."""
     if isinstance(what, Scenario):
-        outcome = what.run(progress=progress, overrides=changes, warn=warn)
+        outcome = what.run(progress=progress, overrides=changes)
         return Subject(Recipe(), outcome.result, outcome)
     if isinstance(what, str | Path):
-        return _run_recipe(Recipe("scenario", _scenario_source(what, folder), overrides=dict(changes)), progress, warn)
+        return _run_recipe(Recipe("scenario", _scenario_source(what, folder), overrides=dict(changes)), progress)
     raise BaselineError(
         "Expected the path of an FMU, the name or path of a scenario, a Scenario, an Outcome or a Result; "
         f"got {type(what).__name__}."
@@ -213,11 +212,11 @@ def _refuse(what: str, settings: Mapping[str, Any]) -> None:
         raise BaselineError(f"{what} takes no {', '.join(settings)}; {hint}.")
 
 
-def _about_inputs(recipe: Recipe, warn: Callable[[str], None] | None) -> Callable[[str], None]:
+def _about_inputs(recipe: Recipe) -> Callable[[str], None]:
     """Warnings of an FMU alone: that inputs keep their start values is no news where constants were given for them."""
 
     def warn_of(text: str) -> None:
-        if warn is not None and not (recipe.inputs and text.startswith("Unconnected inputs")):
-            warn(text)
+        if not (recipe.inputs and text.startswith("Unconnected inputs")):
+            LOG.warning(text)
 
     return warn_of

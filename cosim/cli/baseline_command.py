@@ -19,10 +19,9 @@ from cosim.baselines.references.extract import extract_reference
 from cosim.baselines.subject import Subject, make_subject, run_again
 from cosim.baselines.update import plan_update
 from cosim.cli.arguments import OVERRIDES, QUIET, settings_argument
-from cosim.cli.output import print_warning
 from cosim.cli.scenarios import between_samples, parse_setting, simulated_time_bar
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
-from cosim.comparison.comparison_text import comparison_parts
+from cosim.comparison.comparison_text import comparison_parts, comparison_verdict, difference_parts
 from cosim.comparison.tolerance import Tolerances
 from cosim.components.description import read_description
 from cosim.errors import BaselineError, OutputError
@@ -36,8 +35,8 @@ if TYPE_CHECKING:
     from cosim.baselines import Baseline, Regression
     from cosim.baselines.update import Update
 
-DONE, DIFFERS = 0, 1
-EPILOG = "Exit codes: 0 equal within tolerance or done, 1 different, 2 error."
+DIFFERS = 1
+CODES = "0 equal within tolerance, 1 different, 2 error"
 
 
 FILE = argument("file", metavar="FILE.json", help="the baseline; its tables stand beside it")
@@ -118,7 +117,6 @@ def _subject(options: argparse.Namespace) -> Subject:
             record=options.record,
             interpolation=between_samples(options.between),
             progress=bar,
-            warn=print_warning,
             **_values(options),
         )
 
@@ -141,12 +139,20 @@ def _check(options: argparse.Namespace) -> Output:
     asked = asked_tolerances(options)
     found = [_check_one(baseline, asked, options) for baseline in _baselines(options)]
     data = [one.to_dict() for one in found] if len(found) > 1 else found[0].to_dict()
-    output = Output(
-        [part for one in found for part in comparison_parts(one, options.verbose)],
-        data,
-        code=DONE if all(one.equal for one in found) else DIFFERS,
-    )
+    if len(found) == 1:
+        parts, verdict = difference_parts(found[0], options.verbose), comparison_verdict(found[0])
+    else:
+        parts = [part for one in found for part in comparison_parts(one, options.verbose)]
+        verdict = _of_several(found)
+    output = Output(parts, data, verdict=verdict)
+    output = output if all(one.equal for one in found) else replace(output, code=DIFFERS, role="bad")
     return output if options.plots is None else _drawn(output, found, Path(options.plots))
+
+
+def _of_several(found: Sequence[Regression]) -> str:
+    """Whether all references are met, in a line."""
+    bad = [one.reference for one in found if not one.equal]
+    return f"{len(found) - len(bad)} of {len(found)} references agree" + (f"; {', '.join(bad)} DIFFER." if bad else ".")
 
 
 def _baselines(options: argparse.Namespace) -> list[Baseline]:
@@ -164,7 +170,7 @@ def _check_one(baseline: Baseline, asked: Asked, options: argparse.Namespace) ->
     if other is not None and Path(other).suffix.lower() != ".fmu":
         return check(load_result(other), baseline, tolerances, label=other)
     with _progress(options) as bar:
-        subject = run_again(baseline, other, bar, print_warning)
+        subject = run_again(baseline, other, bar)
     return check(
         subject.outcome or subject.result, baseline, tolerances, label=Path(other or subject.recipe.source).name
     )
@@ -195,7 +201,7 @@ def _update(options: argparse.Namespace) -> Output:
     baseline = read_baseline(options.file)
     tolerances = chosen_tolerances(options, asked_tolerances(options), baseline.tolerances)
     with _progress(options) as bar:
-        subject = run_again(baseline, None, bar, print_warning)
+        subject = run_again(baseline, None, bar)
     header = baseline.header
     update = plan_update(
         subject.outcome or subject.result,
@@ -231,7 +237,7 @@ def _change(update: Update, path: Path) -> Output:
     rows = update.after.baseline.header.rows if update.after.baseline is not None else 0
     line = f"{path}: {update.change}, {len(update.after.signals)} signals, {rows} rows."
     data = {"file": str(path), "change": update.change, "notes": notes}
-    return Output(["\n".join([line, *(f"  {note}" for note in notes)])], data)
+    return Output(["\n".join(f"note: {note}" for note in notes)], data, verdict=line)
 
 
 def _header(baseline: Baseline) -> Parts:
@@ -278,8 +284,14 @@ def _progress(options: argparse.Namespace) -> ProgressBar:
     return simulated_time_bar(silent=options.quiet or options.json)
 
 
-def _action(name: str, execute: Execute, text: str, arguments: Sequence[Argument | ArgumentGroup]) -> Action:
-    words = {"help": text, "description": f"{text[0].upper()}{text[1:]}."}
+def _action(
+    name: str,
+    execute: Execute,
+    text: str,
+    arguments: Sequence[Argument | ArgumentGroup],
+    codes: str = "0 done, 2 error",
+) -> Action:
+    words = {"help": text, "description": f"{text[0].upper()}{text[1:]}.", "epilog": f"Exit codes: {codes}."}
     return Action(name, execute, words, (QUIET, *arguments))
 
 
@@ -296,12 +308,12 @@ EXAMPLES = (
     "cosim baseline embed vendor.json vendor.fmu -o vendor_with_reference.fmu",
     "cosim baseline extract vendor_with_reference.fmu vendor.json",
 )
-PARSER = {"description": "Keep a result as a baseline, and check later ones against it.", "epilog": EPILOG}
+PARSER = {"description": "Keep a result as a baseline, and check later ones against it."}
 ARGUMENTS = (
     Actions(
         (
             _action("make", _make, "run an FMU or a scenario and keep its outputs", _MAKE),
-            _action("check", _check, "run again, or take a given result, and compare", CHECK),
+            _action("check", _check, "run again, or take a given result, and compare", CHECK, CODES),
             _action("show", _show, "show what a baseline is of", (FILE,)),
             _action("update", _update, "run again and accept the outputs as they are now", (FILE, ALLOWED)),
             _action("embed", _embed, "write a copy of an FMU that holds the baseline (FMI-LS-REF)", _EMBED),

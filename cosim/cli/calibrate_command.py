@@ -29,7 +29,7 @@ from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from plant_models import PLANTS
 
-_DONE, _NOT_IDENTIFIED = 0, 1
+_NOT_IDENTIFIED = 1
 RUNNING_RESISTANCE = "running_resistance"
 _RUN_SECONDS, _RUN_STEP = 60.0, 0.05
 
@@ -136,7 +136,10 @@ def execute(options: argparse.Namespace) -> Output:
         write_text(options.toml, found.toml())
     note = [f"- Not recorded, so held at its start: {', '.join(left)}."] if left else []
     parts = [*found.parts(), *note, found.toml().rstrip()]
-    return Output(parts, found.to_dict(), code=_DONE if found.identified else _NOT_IDENTIFIED)
+    if found.identified:
+        return Output(parts, found.to_dict(), verdict="All parameters are identified.")
+    verdict = f"NOT identified: {', '.join(sorted(found.not_identified)) or 'the search did not converge'}."
+    return Output(parts, found.to_dict(), code=_NOT_IDENTIFIED, verdict=verdict, role="bad")
 
 
 def _calibrated(options: argparse.Namespace) -> tuple[Calibration, list[str]]:

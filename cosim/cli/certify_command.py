@@ -22,7 +22,7 @@ from cosim.scenario.toml_file import read_toml
 from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
 
-CERTIFIED, _NOT_CERTIFIED = 0, 1
+_NOT_CERTIFIED = 1
 _FEWEST = 4
 _KINDS = ("sufficient", "exact")
 
@@ -79,8 +79,18 @@ def execute(options: argparse.Namespace) -> Output:
     observers = _observers(options, demands)
     unmet = [text for one in observers for text in one.unmet]
     data = {"observers": [one.to_dict() for one in observers], "not_certified": unmet}
-    failures = [f"not certified: {text}" for text in unmet]
-    return Output([findings_table(observers)], data, code=_NOT_CERTIFIED if unmet else CERTIFIED, failures=failures)
+    parts = [findings_table(observers), "\n".join(f"not certified: {text}" for text in unmet)]
+    verdict = _verdict(len(unmet), sum(len(one.demanded) for one in observers))
+    if unmet:
+        return Output(parts, data, code=_NOT_CERTIFIED, verdict=verdict, role="bad")
+    return Output(parts, data, verdict=verdict)
+
+
+def _verdict(unmet: int, demanded: int) -> str:
+    """Whether what is demanded is certified, in a line."""
+    if unmet:
+        return f"NOT certified: {unmet} of {demanded} demands."
+    return f"Certified: all {demanded} demands." if demanded else "Nothing was demanded: see --gap, --period, --error."
 
 
 def _observers(options: argparse.Namespace, demands: Demands) -> list[Certified]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,6 @@ from cosim.choice.allowance import Allowance
 from cosim.choice.choice import INTERRUPTED, Choice
 from cosim.choice.choose import SEEDS, choose, scenario_for_fmu
 from cosim.cli.arguments import QUIET, settings_argument
-from cosim.cli.output import print_warning
 from cosim.cli.scenarios import load_scenario
 from cosim.errors import OutputError, RunError
 from cosim.results.results_folder import check_writable
@@ -106,7 +106,7 @@ def _chosen(options: argparse.Namespace, bar: ProgressBar) -> Choice:
         "recorded": options.recorded,
         "workers": options.workers,
         "progress": lambda what, done, total: bar(done, total, what),
-        "warn": print_warning,
+        "warn": logging.getLogger("cosim").warning,
     }
     return choose(_scenario(options), options.observers, **more)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from cosim.baselines import check, is_baseline, read_baseline
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
 from cosim.comparison.compare import compare_results
-from cosim.comparison.comparison_text import comparison_parts
+from cosim.comparison.comparison_text import comparison_verdict, difference_parts
 from cosim.comparison.tolerance import Tolerances
 from cosim.errors import ComparisonError, OutputError, nearest
 from cosim.results.load_result import load_result
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cosim.comparison.comparison import Comparison
     from cosim.results.result import Result
 
-EQUAL, _DIFFERENT = 0, 1
+_DIFFERENT = 1
 _NO_TELEGRAMS = "Telegrams and packets were not compared (--no-telegrams)."
 EPILOG = (
     'A tolerance file is TOML: [default] with absolute, relative, time and time_relative; [signals."train.*"] with the '
@@ -84,9 +84,9 @@ def execute(options: argparse.Namespace) -> Output:
     """Compare, and write what the options ask for."""
     asked = asked_tolerances(options)  # before anything is read: a mistake in them is named at once
     comparison = replace(_compare(options, asked), extra_fails=options.extra_fails)
-    parts = comparison_parts(comparison, verbose=options.verbose)
-    code = EQUAL if comparison.equal else _DIFFERENT
-    found = Output(parts[:1] if options.quiet else parts, comparison.to_dict(), code=code)
+    parts = [] if options.quiet else difference_parts(comparison, verbose=options.verbose)
+    found = Output(parts, comparison.to_dict(), verdict=comparison_verdict(comparison))
+    found = found if comparison.equal else replace(found, code=_DIFFERENT, role="bad")
     return _drawn(found, comparison, options) if options.html or options.plots else found
 
 

@@ -44,10 +44,13 @@ def execute(options: argparse.Namespace) -> Output:
     """Find the page or make it, and show it, as the options ask."""
     page = _page(Path(options.results), options.out)
     if options.no_browser:
-        return Output([], {"page": str(page)}, {"page": page})
+        return Output([], {"page": str(page)}, {"page": page}, verdict="The page is written.")
     opened = webbrowser.open(page.resolve().as_uri())
-    remark = [] if opened else ["no browser could be opened here: open the page yourself."]
-    return Output(remark, {"page": str(page), "opened": opened}, {"page": page}, code=0 if opened else 1)
+    data = {"page": str(page), "opened": opened}
+    if not opened:
+        verdict = "No browser could be opened here: open the page yourself."
+        return Output([], data, {"page": page}, code=1, verdict=verdict, role="bad")
+    return Output([], data, {"page": page}, verdict="The page is opened.")
 
 
 def _page(path: Path, out: str | None) -> Path:

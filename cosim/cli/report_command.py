@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import sys
+import logging
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cosim.evaluation.spec import ReportSpec
     from cosim.results.result import Result
 
+LOG = logging.getLogger("cosim")
 OVERLAY = "overlay.html"
 MOST_SIGNALS = 16  # panels that a page opens with
 
@@ -56,7 +57,7 @@ def execute(options: argparse.Namespace) -> Output:
     specs = [spec_of(result, label) for result, label in zip(results, labels, strict=True)]
     for path, result, spec in zip(paths, results, specs, strict=True):
         if is_guessed(result):
-            print(f"{path} does not say which signals play which role; {_guess(spec)}", file=sys.stderr)
+            LOG.warning("%s does not say which signals play which role; %s", path, _guess(spec))
     page = (
         _one(options, paths[0], results[0], specs[0]) if len(paths) == 1 else _several(options, results, specs, labels)
     )

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from cosim.cli.arguments import QUIET, settings_argument
-from cosim.cli.output import ignore, print_notice, print_warning
+from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import parse_setting, simulated_time_bar
 from cosim.provenance import rerun
 from fmus.cli.commands import argument
@@ -66,16 +66,17 @@ def execute(options: argparse.Namespace) -> Output:
             tolerance=options.tolerance,
             trust=options.trust,
             progress=bar,
-            warn=print_warning,
             building=ignore if options.quiet else print_notice,
         )
     finally:
         bar.close()
     failed = again.outcome.failure is not None and again.outcome.failure != again.stored_failure
     return Output(
-        again.parts(),
+        again.details(options.verbose),
         again.to_dict(),
         again.paths,
         ERROR if failed else EQUAL if again.equal else DIFFERS,
         [f"the new run ended early: {again.outcome.failure}"] if failed else [],
+        verdict=again.verdict_line,
+        role="good" if again.equal else "bad",
     )

@@ -13,7 +13,7 @@ from typing import Any
 
 from cosim import studies
 from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
-from cosim.cli.output import Warnings, ignore, print_notice
+from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import load_scenario, simulated_time_bar
 from cosim.errors import OutputError
 from cosim.evaluation.consistency import filter_consistency
@@ -145,12 +145,10 @@ def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, cal
     """Run, with a bar."""
     directory = results.directory
     bar = simulated_time_bar(silent=options.quiet or options.json)
-    warnings = Warnings(whole=options.verbose, before=bar.clear)
     try:
         with _kept(directory, options.stream, scenario.table().report.tables) as fallback:
             scenario.run(
                 progress=bar,
-                warn=warnings,
                 call_log=call_log,
                 building=ignore if options.quiet else print_notice,
                 stream=directory if options.stream else None,
@@ -159,7 +157,6 @@ def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, cal
             )
     finally:
         bar.close()
-        warnings.end()
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 
 from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
@@ -18,6 +19,7 @@ from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from plant_models.hybrid.casadi_package import demand_casadi
 
+LOG = logging.getLogger("cosim")
 _DONE, _NOT_BETTER = 0, 1
 
 
@@ -98,12 +100,17 @@ def execute(options: argparse.Namespace) -> Output:
         Path(options.out) if options.out is not None else Path("results") / f"{scenario.name}_tuned"
     )
     found = _tuned(scenario, options, directory)
+    for text in found.warnings:
+        LOG.warning(text)
+    lucky = bool(found.validated) and not found.shown_better
     return Output(
-        found.parts(),
+        found.details(),
         found.to_data(),
         {"tuned": directory / "tuned.toml"},
-        code=_NOT_BETTER if found.validated and not found.gain.low > 0.0 else _DONE,
+        code=_NOT_BETTER if lucky else _DONE,
         error=KeyboardInterrupt() if found.interrupted else None,
+        verdict=found.verdict,
+        role="good" if found.shown_better else "doubtful",
     )
 
 

@@ -46,7 +46,7 @@ _POINT_COLUMNS = (
 SPAN = ("starts_early", "starts_late", "ends_early", "ends_late", "gap")
 MOST_LINES = 32
 """Of a comparison where not all is asked for: pytest adds the baseline and where the pages are, and 40 fit a screen."""
-_CAUSES, _CHANGES, _ROWS, _NOTES = 3, 3, 6, 4
+_FIRST_CAUSES, _CHANGES, _ROWS, _NOTES = 3, 3, 6, 4
 _NOTES_OF_EQUAL = 10
 _ALL = 10**9
 
@@ -57,16 +57,27 @@ def comparison_text(comparison: ComparisonData, verbose: bool = False) -> str:
 
 
 def comparison_parts(comparison: ComparisonData, verbose: bool = False) -> Parts:
-    """A comparison for people: what was different in what was run, the verdict in a line, what the differences have in
-    common, how large they are, and where.
+    """A comparison for people: what was different in what was run, the verdict in a line, and the other parts of
+    `difference_parts`.
 
     Args:
         comparison: what was found.
         verbose: all signals, findings, telegrams and packets; else what fits `MOST_LINES`, the worst first.
     """
+    causes, *others = difference_parts(comparison, verbose)
+    verdict = comparison_verdict(comparison)
+    return [verdict, causes, *others] if comparison.equal else [joined([f"{causes}\n{verdict}".lstrip()]), *others]
+
+
+def difference_parts(comparison: ComparisonData, verbose: bool = False) -> Parts:
+    """A comparison without its verdict: what was different in what was run, what the differences have in common, how
+    large they are, and where.
+
+    Args:
+        comparison, verbose: as for `comparison_parts`.
+    """
     shared = _shared(comparison)
     shown = _shown(comparison, verbose, shared)
-    head = _head(comparison, _ALL if verbose else _CAUSES)
     common = [*(change.text for change in common_changes(comparison))]
     common += [f"all {count} signals: {text}" for text, count in shared.items()]
     table = _worst_signals(shown, _ALL if verbose else _ROWS)
@@ -74,16 +85,16 @@ def comparison_parts(comparison: ComparisonData, verbose: bool = False) -> Parts
     most_notes = _ALL if verbose else _NOTES_OF_EQUAL if comparison.equal else _NOTES
     notes = "\n".join(_first(others, most_notes, "notes"))
     changes = "\n".join(f"  {line}" for line in _first(common, _ALL if verbose else _CHANGES, "changes"))
-    above: list[Table | str] = [*head, changes, table]
-    room = _ALL if verbose else MOST_LINES - len(joined([*above, notes]).splitlines()) - 2
+    above: list[Table | str] = [_causes(comparison, _ALL if verbose else _FIRST_CAUSES), changes, table]
+    room = _ALL if verbose else MOST_LINES - len(joined([*above, notes]).splitlines()) - 3
     return [*above, *_symptoms(comparison, shown, shared, verbose, room), notes]
 
 
-def _head(comparison: ComparisonData, most: int) -> list[str]:
-    """The verdict; behind the causes where something differs."""
+def _causes(comparison: ComparisonData, most: int) -> str:
+    """What was different in what was run."""
     if comparison.equal:
-        return [_headline(comparison), "\n".join(f"note: {cause}" for cause in comparison.causes[:most])]
-    return ["\n".join([*_first(comparison.causes, most, "differences of what was run"), _headline(comparison)])]
+        return "\n".join(f"note: {cause}" for cause in comparison.causes[:most])
+    return "\n".join(_first(comparison.causes, most, "differences of what was run"))
 
 
 def _first(lines: Sequence[str], most: int, what: str) -> list[str]:
@@ -139,7 +150,12 @@ def _own(signal: SignalComparison, shared: Mapping[str, int]) -> list[Comparison
     return [finding for finding in signal.findings if finding.text.removeprefix(signal.name + ": ") not in shared]
 
 
-def _headline(comparison: ComparisonData) -> str:
+def comparison_verdict(comparison: ComparisonData) -> str:
+    """Whether the result is as the reference, and how many signals and telegrams are, in a line.
+
+    Args:
+        comparison: what was found.
+    """
     statuses = [signal.status for signal in comparison.signals]
     words = {
         "equal": "equal",

@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.comparison.compare import compare
 from cosim.comparison.comparison import Comparison
-from cosim.comparison.comparison_text import comparison_parts
+from cosim.comparison.comparison_text import difference_parts
 from cosim.errors import OutputError, ProvenanceError
 from cosim.results.load_result import load_result
 from cosim.results.unfinished import DID_NOT_END
@@ -105,17 +105,29 @@ class Rerun(Readable):
         """Whether the results are the same, to the last bit or within the tolerance."""
         return self.verdict != "differs"
 
-    def parts(self) -> Parts:
-        """Verdict, what differs, and what changed since, for people."""
+    @property
+    def verdict_line(self) -> str:
+        """The verdict with what was compared."""
         rows, telegrams = len(self.outcome.result.table), len(self.outcome.result.events)
         counts = f"{rows} rows, {len(self.comparison.signals)} signals, {telegrams} telegrams"
-        lines = [f"{self.directory}: {self.verdict} ({counts})."]
+        return f"{self.directory}: {self.verdict} ({counts})."
+
+    def parts(self) -> Parts:
+        """What changed since, what differs, and the verdict, for people."""
+        return [*self.details(), self.verdict_line]
+
+    def details(self, verbose: bool = False) -> Parts:
+        """The same without the verdict.
+
+        Args:
+            verbose: whether all signals and findings are shown, and not the worst alone.
+        """
+        lines = []
         if self.verdict == "within tolerance":
             largest = max((s.max_error for s in self.comparison.signals if s.status == "within"), default=0.0)
-            lines.append(f"  the largest difference is {largest:.3g} in the unit of its signal")
+            lines.append(f"The largest difference is {largest:.3g} in the unit of its signal.")
         lines += ["Changed since:", *(f"  {c}" for c in self.changes)] if self.changes else ["Nothing changed since."]
-        differing = comparison_parts(self.comparison)[1:]  # its first line is a verdict too
-        return ["\n".join(lines), *differing]
+        return ["\n".join(lines), *difference_parts(self.comparison, verbose)]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for a JSON file."""

@@ -41,7 +41,7 @@ def tuning_page(tuning: Tuning) -> LivePage:
         panels=[PagePanel(_CONVERGENCE, [_CONVERGENCE, "before"], log=is_positive)],
         sections=[
             Section("Warnings", [[*tuning.warnings]], mood="doubt"),
-            Section("What was found", [*tuning.parts()]),
+            Section("What was found", [*tuning.details()]),
             Section("Parameters of each search", [Rows(_parameters(tuning))]),
             Section("Costs of every seed", [Rows(_seeds(tuning))]),
         ],
@@ -56,21 +56,7 @@ def _search(evaluations: Sequence[int], costs: Sequence[float], label: str) -> P
 
 def _verdict(tuning: Tuning) -> PageVerdict:
     """Whether seeds that no search has seen show a gain."""
-    gain, kind = tuning.gain, "validation" if tuning.validated else "training"
-    text = f"Cost {number(_mean(tuning, 0))} before, {number(_mean(tuning, 1))} after, with the {kind} seeds"
-    text += f": a gain of {gain.text()}."
-    if tuning.interrupted:
-        return PageVerdict(f"{text} The search was interrupted.", "doubt")
-    if not tuning.validated:
-        return PageVerdict(f"{text} No seed validates it: what was learnt may be luck.", "doubt")
-    if not gain.low > 0.0:
-        return PageVerdict(f"{text} This does not show that the scenario has become better: it may be luck.", "doubt")
-    return PageVerdict(text, "good")
-
-
-def _mean(tuning: Tuning, after: int) -> float:
-    pairs = (tuning.validated_before, tuning.validated_after) if tuning.validated else (tuning.before, tuning.after)
-    return float(np.mean(pairs[after]))
+    return PageVerdict(tuning.verdict, "good" if tuning.shown_better and not tuning.interrupted else "doubt")
 
 
 def _cards(tuning: Tuning) -> list[Card]:

@@ -95,13 +95,32 @@ class Tuning(Readable):
             )
         return Table("costs", _COST_COLUMNS, rows, f"{self.method}: {self.cost}")
 
+    @property
+    def shown_better(self) -> bool:
+        """Whether the validation seeds show a gain."""
+        return bool(self.validated) and self.gain.low > 0.0
+
+    @property
+    def verdict(self) -> str:
+        """Whether seeds that no search has seen show a gain, in a sentence or two."""
+        kind = "validation" if self.validated else "training"
+        costs = (self.validated_before, self.validated_after) if self.validated else (self.before, self.after)
+        before, after = (number(float(np.mean(values))) for values in costs)
+        text = f"Cost {before} before, {after} after, with the {kind} seeds: a gain of {self.gain.text()}."
+        if self.interrupted:
+            return f"{text} The search was interrupted."
+        if not self.validated:
+            return f"{text} No seed validates it: what was learnt may be luck."
+        return text if self.shown_better else f"{text} This does not show that it has become better: it may be luck."
+
     def parts(self) -> Parts:
-        """Costs before and after, spread over searches, values, warnings."""
+        """Costs before and after, spread over searches, values, warnings, verdict."""
+        return [*self.details(), "\n".join(f"warning: {text}" for text in self.warnings), self.verdict]
+
+    def details(self) -> Parts:
+        """The same without warnings and verdict."""
         values = [[name, self.start.get(name), value] for name, value in self.best.items()]
-        luck = "The validation seeds do not show that the scenario has become better: what was learnt may be luck."
-        lines = [luck] if self.validated and not self.gain.low > 0.0 else []
-        lines += [f"held: {name}, {why}" for name, why in self.fixed.items()]
-        lines += [f"warning: {text}" for text in self.warnings]
+        lines = [f"held: {name}, {why}" for name, why in self.fixed.items()]
         remarks = "\n".join([*lines, f"{self.runs} runs, {self.how}."])
         return [self.costs(), self._spread(), Table("parameters", _VALUE_COLUMNS, values), remarks]
 

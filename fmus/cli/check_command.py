@@ -15,6 +15,7 @@ from typing import Any
 
 from fmus.check.findings import Class, Verdict
 from fmus.check.run import CheckReport, check_count, check_fmu
+from fmus.cli.colour import Role
 from fmus.cli.commands import argument, one_of, repeated
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
@@ -34,7 +35,12 @@ GROUP = "FMUs"
 PLACE = 2
 HELP = "how far an FMU can be trusted: validity and behaviour"
 EXAMPLES = ("fmus check vendor.fmu",)
-PARSER: dict[str, Any] = {}
+PARSER = {
+    "epilog": (
+        "Exit codes: 0 use it as it is, or with the limits that are reported, 1 do not trust it, with --strict also "
+        "where there are limits, 2 it cannot be checked."
+    )
+}
 ARGUMENTS = (
     argument("file", type=Path, metavar="FILE", help="an FMU, FMI 2.0 or 3.0"),
     argument("--step", type=float, metavar="H", help="communication step in s (default: the FMU's own)"),
@@ -62,7 +68,10 @@ def execute(options: argparse.Namespace) -> Output:
             options.output.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     except OSError as error:  # the report is shown all the same
         failure = error
-    return Output(_parts(report), data, code=_exit_code(report, options.strict), error=failure)
+    code = _exit_code(report, options.strict)
+    verdict = f"Verdict: {report.verdict} ({_counts(report)}, {report.seconds:.1f} s)"
+    role: Role = "good" if report.clean else "doubtful" if code == CLEAN else "bad"
+    return Output(_parts(report), data, code=code, error=failure, verdict=verdict, role=role)
 
 
 def _exit_code(report: CheckReport, strict: bool) -> int:
@@ -102,12 +111,16 @@ def _starts(words: Sequence[str]) -> dict[str, float]:
 
 
 def _parts(report: CheckReport) -> Parts:
-    """The report for people: what was checked, one row a finding, the verdict with its limits, what to trust."""
+    """The report for people: what was checked, one row a finding, its limits, what to trust."""
     rows = [[finding.check, str(finding.verdict), finding.detail] for finding in report.findings]
-    verdict = [f"Verdict: {report.verdict} ({_counts(report)}, {report.seconds:.1f} s)"]
-    verdict += [f"{_BULLET}{advice} ({', '.join(checks)})" for advice, checks in _reasons(report).items()]
+    limits = [f"{_BULLET}{advice} ({', '.join(checks)})" for advice, checks in _reasons(report).items()]
     trust = ["What to trust:", *(f"{_BULLET}{sentence}" for sentence in report.trust)]
-    return [_heading(report), Table("findings", _COLUMNS, rows), "\n".join(verdict), "\n".join(trust)]
+    return [
+        _heading(report),
+        Table("findings", _COLUMNS, rows),
+        "\n".join(["What limits it:", *limits]) if limits else "",
+        "\n".join(trust),
+    ]
 
 
 def _data(report: CheckReport) -> dict[str, Any]:

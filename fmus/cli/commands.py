@@ -26,6 +26,7 @@ from fmus.cli.completion import completion_script
 from fmus.cli.output import Output, UnwritableError
 from fmus.cli.parsers import MISTAKE, Parser, print_error
 from fmus.cli.signals import BROKEN_PIPE, forget_output
+from fmus.cli.warning_lines import warnings_in_lines
 from fmus.tables.table import Table, joined, name_column, text_column
 from fmus.tables.terminal import terminal_width
 from fmus.versions import version_text
@@ -168,6 +169,8 @@ def add_command(subparsers: Any, name: str, module: Any) -> None:
 def _fill(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions], execute: Execute | None) -> None:
     _add_arguments(parser, arguments)
     if execute is not None:
+        if "--verbose" not in parser._option_string_actions:
+            parser.add_argument("--verbose", action="store_true", help="print warnings whole")
         parser.add_argument("--json", action="store_true", help="print the data as JSON instead of text")
         parser.set_defaults(execute=execute)
 
@@ -212,7 +215,7 @@ class CommandProgram:
         options = argparse.Namespace(command_line=shlex.join([self.name, *words]))
         try:  # reading the words loads the command, which may be interrupted too
             self.parser(words).parse_args(words, options)
-            with self.within():
+            with self.within(), warnings_in_lines(whole=options.verbose):
                 output: Output = options.execute(options)
                 return output.show(self.name, as_json=options.json)
         except BrokenPipeError:  # whoever read has seen enough, as `head` does

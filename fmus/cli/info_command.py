@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.fmu_report import describe_file, description_parts, problems_of
 from fmus.near_files import missing_file
 
-OK, PROBLEMS = 0, 1
+PROBLEMS = 1
 
 GROUP = "FMUs"
 PLACE = 1
 HELP = "what an FMU says about itself, and whether it is valid"
 EXAMPLES = ("fmus info vendor.fmu",)
-PARSER: dict[str, Any] = {}
+PARSER = {"epilog": "Exit codes: 0 the description is valid, 1 it has problems, 2 error."}
 ARGUMENTS = (argument("file", type=Path, metavar="FILE"),)
 
 
@@ -31,4 +30,7 @@ def execute(options: argparse.Namespace) -> Output:
         raise FileNotFoundError(missing_file(options.file, ".fmu"))
     data, problems = describe_file(options.file), problems_of(options.file)
     parts = [*description_parts(data), "\n".join(f"problem: {problem}" for problem in problems)]
-    return Output(parts, data | {"problems": problems}, code=PROBLEMS if problems else OK)
+    if problems:
+        verdict = f"NOT valid: {len(problems)} problem{'s' if len(problems) > 1 else ''}."
+        return Output(parts, data | {"problems": problems}, code=PROBLEMS, verdict=verdict, role="bad")
+    return Output(parts, data | {"problems": problems}, verdict="The description is valid.")

@@ -25,7 +25,8 @@ class Output:
         data: for programs. A mapping also gets each table of `parts` that it does not hold, under its key, and `files`;
             None for the tables, and the texts of `parts` under ``text``.
         files: what was written, by kind. code: exit code. failures: texts for standard error.
-        verdict: what it comes to, in a sentence, which is printed last. role: what the verdict is.
+        verdict: what it comes to, in a sentence, which is printed last; in data where that has no verdict of its own.
+            role: what the verdict is.
         error: what ended the command although there is something to show; raised when that has been shown.
     """
 
@@ -44,7 +45,7 @@ class Output:
         if isinstance(data, Mapping):
             data = {part.key: part.data() for part in self.parts if isinstance(part, Table)} | dict(data)
             data |= {"files": self.files} if self.files else {}
-            data |= {"verdict": self.verdict} if self.verdict else {}
+            data = ({"verdict": self.verdict} if self.verdict else {}) | data
         return jsonable(data)
 
     def text(self, width: int | None = None) -> str:

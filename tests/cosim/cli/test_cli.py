@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import re
 import subprocess
 import sys
@@ -16,12 +17,12 @@ import fmu_observer
 import plant_models
 from cosim import Scenario
 from cosim.cli import main
-from cosim.cli.output import Warnings
 from cosim.cli.scenarios import parse_setting
 from cosim.errors import RunError
 from cosim.results.results_folder import read_results
 from fmu_observer import OBSERVERS
 from fmu_observer.recommended import RECOMMENDED
+from fmus.cli.warning_lines import warnings_in_lines
 
 
 @pytest.fixture
@@ -64,10 +65,11 @@ def test_the_verdict_comes_last_and_warnings_take_a_line_each(
 
 def test_a_warning_is_cut_to_the_terminal(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "40")
-    warnings = Warnings(whole=False)
-    warnings("The train never moves: train.speed stays below 0.01 m/s up to 10 s. Errors beside it say nothing.")
-    warnings("Short.")
-    warnings.end()
+    log = logging.getLogger("cosim")
+    with warnings_in_lines(whole=False):
+        log.warning("The train never moves: train.speed stays below %g m/s up to 10 s. Errors say nothing.", 0.01)
+        log.warning("Short.")
+        log.info("Not shown.")
     lines = capsys.readouterr().err.splitlines()
     assert lines == ["warning: The train never moves ...", "warning: Short.", "(--verbose shows warnings whole)"]
 

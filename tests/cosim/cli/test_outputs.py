@@ -4,9 +4,15 @@ than the terminal; and what the help says of them.
 
 from __future__ import annotations
 
+import argparse
 import json
+import logging
 import os
+import re
 import shlex
+import shutil
+import warnings
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -51,12 +57,22 @@ LINES = {
         "show": "show TRAIN --picture OUT.svg",
         "sweep": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --quiet --out OUT",
         "tune": "tune TRAIN --observer multirate_cdo --parameters theta_2=1:3 --iterations 1 --quiet --out OUT",
+        "baseline check of what differs": "baseline check BASE.json --against OTHER",
+        "baseline check of two references": "baseline check TWICE.fmu --quiet",
+        "calibrate what is not seen": "calibrate running_resistance SHORT.csv --signals speed=locomotive.speed",
+        "certify what does not hold": "certify takagi_sugeno_cdo --no-simulation --gap 5 --period 9",
+        "compare of one with itself": "compare RESULTS RESULTS",
+        "rerun of something else": "rerun RESULTS --quiet --set locomotive.mass=81e3",
+        "run of what is not met": "run UNMET.toml --quiet --out OUT --no-report",
+        "sweep that fails": "sweep TRAIN --vary locomotive.mass=70e3,-1 --quiet --out OUT",
         "sweep by": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --by locomotive.mass --quiet --out OUT",
     },
     "fmus": {
         "build": "build driver -o OUT",
         "check": "check LAG.fmu -o OUT.json",
+        "check of what lies": "check BROKEN.fmu",
         "info": "info LAG.fmu",
+        "info of what is damaged": "info BROKEN.fmu",
         "list": "list",
     },
 }
@@ -78,14 +94,20 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     os.chdir(folder)
     scenario = Scenario.load("freight_profile_d").set("stop", 12.0).set("expect", []).set("step", 0.05)
     scenario.save(folder / "TRAIN.toml")
+    unmet = {"check": "signal", "signal": "locomotive.speed", "max": 0.001}
+    scenario.copy().set("expect", [unmet]).save(folder / "UNMET.toml")
     scenario.set("locomotive.mass", 80e3).save(folder / "heavy.toml")
-    linear_fmu(folder, "LAG", [[-1.0]], [[1.0]], [[1.0]], [[0.0]], version=2, x0=[1.0])
+    lag = linear_fmu(folder, "LAG", [[-1.0]], [[1.0]], [[1.0]], [[0.0]], version=2, x0=[1.0])
+    with zipfile.ZipFile(shutil.copy(lag, folder / "BROKEN.fmu"), "a") as archive:
+        archive.writestr("binaries/linux64/OTHER.so", b"not a library")
     for line in (
         "run TRAIN.toml --no-report --quiet --out RESULTS",
         "run heavy.toml --no-report --quiet --out OTHER",
         "baseline make TRAIN.toml BASE.json --quiet",
         "baseline make LAG.fmu FMUBASE.json --quiet --stop 1 --step 0.1",
         "baseline embed FMUBASE.json LAG.fmu -o HOLDS.fmu",
+        "baseline embed FMUBASE.json HOLDS.fmu -o TWICE.fmu --name again",
+        "export RESULTS SHORT.csv",
     ):
         assert output_of("cosim", line.split()).code == 0
     yield folder
@@ -153,6 +175,51 @@ def test_no_line_is_wider_than_the_terminal(
     output.show("program", as_json=False)
     lines = capsys.readouterr().out.splitlines()
     assert [line for line in lines if len(line) > width and " " in line.split(": ", 1)[-1].strip()] == []
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize(("output", "case"), [(case, case) for case in CASES], indirect=["output"], ids=str)
+def test_a_verdict_comes_last_in_one_line(
+    output: Output, case: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of every command that ends with 1 where it is bad, as its help says."""
+    words = LINES[case[0]][case[1]].split()
+    help_of = " ".join(PROGRAMS[case[0]].parser(words)._used(words).format_help().split())
+    can_fail = re.search(r"Exit codes: 0 .*, 1 ", help_of)
+    assert output.verdict or not can_fail
+    assert output.code == 0 or (output.code == 1 and can_fail)
+    assert "\n" not in output.verdict
+    assert output.show("program", as_json=False) == output.code
+    printed = capsys.readouterr()
+    assert printed.err == ""
+    if output.verdict:
+        assert printed.out.splitlines()[-2:] in (["", output.verdict], [output.verdict])
+
+
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize("case", CASES, ids=" ".join)
+def test_every_command_prints_warnings_a_line_each_and_whole_where_asked(
+    case: tuple[str, str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a command does is replaced by one that warns."""
+    program, name = PROGRAMS[case[0]], case[1]
+
+    def warns(_options: argparse.Namespace) -> Output:
+        logging.getLogger("cosim").warning("It stands at %g s. It says nothing.", 0.5)
+        warnings.warn("a number is\nnot finite; it is left out", stacklevel=1)
+        return Output(verdict="Well.")
+
+    changed: Any = lambda parser, **_: parser._defaults.update(execute=warns)  # noqa: E731
+    monkeypatch.setattr(argparse.ArgumentParser, "set_defaults", changed)
+    words = LINES[case[0]][name].replace("--verbose", "").split()
+    assert program.run(words) == 0
+    brief = capsys.readouterr()
+    assert brief.out == "Well.\n"
+    first, second, end = brief.err.splitlines()
+    assert (first, second) == ("warning: It stands at 0.5 s ...", "warning: a number is not finite ...")
+    assert end == "(--verbose shows warnings whole)"
+    assert program.run([*words, "--verbose"]) == 0
+    assert "It stands at 0.5 s. It says nothing." in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("program", LINES)

@@ -31,7 +31,7 @@ def test_a_run_done_again(kept: Path, tmp_path: Path) -> None:
     before = everything(kept)
     again = rerun(kept, out=tmp_path / "again")
     assert (again.verdict, again.equal, again.changes) == ("bit-identical", True, ())
-    assert again.text() == f"{kept}: bit-identical (11 rows, 1 signals, 0 telegrams).\nNothing changed since."
+    assert again.text() == f"Nothing changed since.\n\n{kept}: bit-identical (11 rows, 1 signals, 0 telegrams)."
     np.testing.assert_array_equal(again.outcome.result.table, read_results(kept).table)
     np.testing.assert_array_equal(read_results(tmp_path / "again").table, read_results(kept).table)
     assert everything(kept) == before
