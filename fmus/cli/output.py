@@ -13,7 +13,7 @@ from fmus.cli.parsers import print_error
 from fmus.plain import plain
 from fmus.tables.plain_data import jsonable
 from fmus.tables.table import Parts, Table, joined
-from fmus.tables.terminal import terminal_width
+from fmus.tables.terminal import PIPED, terminal_width
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,12 @@ class Output:
         """All of it for people, a blank line between the parts.
 
         Args:
-            width: of the terminal, which is not exceeded; None for lines as long as they are.
+            width: of the terminal, which is not exceeded; None for a file or a pipe, where a row is a line.
         """
         files = "\n".join(f"{kind:>10}: {path}" for kind, path in self.files.items())
-        return joined([*self.parts, files, self.verdict], width)
+        how = "see --json or the page" if {"page", "report"} & set(self.files) else "see --json"
+        parts = [part.within(PIPED, how) if width is None and isinstance(part, Table) else part for part in self.parts]
+        return joined([*parts, files, self.verdict], width)
 
     def show(self, program: str, *, as_json: bool) -> int:
         """Print it; nothing but JSON goes to standard output where that was asked for.

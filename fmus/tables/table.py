@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from fmus.tables.notebook import paragraph_html, table_html
-from fmus.tables.numbers import error_number, number
-from fmus.tables.terminal import laid_out, paragraph
+from fmus.tables.numbers import DASH, error_number, number
+from fmus.tables.terminal import laid_out, paragraph, room_for
 
 BAD = frozenset({"diverged", "does not hold", "not met"})
 """Texts of cells that stand out on a page."""
@@ -117,6 +117,8 @@ class Table(FirstScreen):
         key: in data, where it stands beside others. columns: names first. rows: values in the order of the columns.
         title: above it in a terminal. notes: below it in a terminal.
         bad: texts of cells that stand out on a page.
+        rows_are: what the rows are, such as ``runs``: a column that reads the same in all of them is then shown as a
+            part of `lead`. lead: a sentence above it wherever it is shown.
 
     Raises:
         ValueError: a row has more or fewer values than there are columns.
@@ -128,6 +130,8 @@ class Table(FirstScreen):
     title: str = ""
     notes: Sequence[str] = ()
     bad: Container[str] = BAD
+    rows_are: str = ""
+    lead: str = ""
 
     def __post_init__(self) -> None:
         for row in self.rows:
@@ -160,6 +164,28 @@ class Table(FirstScreen):
         rows = [[row[i] for i in kept] for row in self.rows] if others else []
         return replace(self, columns=[self.columns[i] for i in kept], rows=rows)
 
+    def shown(self) -> Table:
+        """The table as it is read: what is the same in all rows stands in a sentence above, see `rows_are`."""
+        if not self.rows_are or not self.names or len(self.rows) < 2:
+            return self
+        cells = list(zip(*self.cells, strict=True))
+        same = [i for i, column in enumerate(self.columns) if column.kind != "name" and len(set(cells[i])) == 1]
+        kept = [i for i in range(len(self.columns)) if i not in same]
+        none = [i for i in same if cells[i][0] in ("", DASH)]
+        known = [
+            f"{self.columns[i].heading} {cells[i][0]} {self.columns[i].unit}".strip() for i in same if i not in none
+        ]
+        lead = [f"The same in all {self.rows_are}: {', '.join(known)}."] if known else []
+        names = ", ".join(self.columns[i].heading.strip() for i in none)
+        lead += [f"Without a value in all {self.rows_are}: {names}."] if none else []
+        return replace(
+            self,
+            columns=[self.columns[i] for i in kept],
+            rows=[[row[i] for i in kept] for row in self.rows],
+            rows_are="",
+            lead=" ".join([self.lead, *lead]).strip(),
+        )
+
     def data(self) -> list[dict[str, Any]]:
         """The rows as plain data by the keys of the columns, numbers in SI units."""
         keys = [column.key for column in self.columns]
@@ -178,16 +204,24 @@ class Table(FirstScreen):
         if len(self.rows) <= most:
             return self
         note = f"... and {len(self.rows) - most} more rows"
-        return replace(self, rows=self.rows[:most], notes=[note, *self.notes])
+        shown = self.shown()
+        return replace(shown, rows=shown.rows[:most], notes=[note, *self.notes])
 
     def html(self) -> str:
         """The table for a notebook: title, headings with their meanings, rows, notes; empty without rows."""
         if not self.rows:
             return ""
-        headings = [(column.title(), column.meaning) for column in self.columns]
-        left = [i for i, column in enumerate(self.columns) if column.kind != "number"]
-        parts = [paragraph_html(self.title), table_html(headings, self.cells, left, self.bad)]
-        return "".join([*parts, paragraph_html("\n".join(self.notes))])
+        shown = self.shown()
+        headings = [(column.title(), column.meaning) for column in shown.columns]
+        table = table_html(headings, shown.cells, shown._left, self.bad)
+        texts = (self.title, shown.lead, "\n".join(self.notes))
+        title, lead, notes = map(paragraph_html, texts)
+        return f"{title}{lead}{table}{notes}"
+
+    @property
+    def _left(self) -> list[int]:
+        """Indices of the columns that stand on the left."""
+        return [i for i, column in enumerate(self.columns) if column.kind != "number"]
 
     def text(self, width: int | None = None) -> str:
         """The table for a terminal: title, headings, rows, notes; empty without rows; ends without a line break.
@@ -198,11 +232,32 @@ class Table(FirstScreen):
         """
         if not self.rows:
             return ""
-        headings = [column.title(short=True) for column in self.columns]
-        left = [i for i, column in enumerate(self.columns) if column.kind != "number"]
-        lines = laid_out(headings, self.cells, left, self.names, width)
-        above = paragraph(self.title, width) if self.title else []
+        shown = self.shown()
+        lines = laid_out(shown._headings, shown.cells, shown._left, shown.names, width)
+        above = [line for text in (self.title, shown.lead) if text for line in paragraph(text, width)]
         return "\n".join([*above, *lines, *(line for note in self.notes for line in paragraph(note, width))])
+
+    def within(self, most: int, how: str) -> Table:
+        """The table for a file or a pipe, where a row stays on a line: headings are wrapped, and columns of numbers
+        that find no room all the same are named in a note.
+
+        Args:
+            most: length of a line; only a text that ends a row may be longer. how: such columns can be seen.
+        """
+        shown = self.shown()
+        kept, headings = room_for(shown._headings, shown.cells, shown._left, shown.names, most)
+        left_out = [column.heading for i, column in enumerate(shown.columns) if i not in kept]
+        note = f"{len(left_out)} more columns, {how}: {', '.join(left_out)}."
+        return replace(
+            shown,
+            columns=[replace(shown.columns[i], short=headings[i], unit="") for i in kept],
+            rows=[[row[i] for i in kept] for row in shown.rows],
+            notes=[note, *self.notes] if left_out else self.notes,
+        )
+
+    @property
+    def _headings(self) -> list[str]:
+        return [column.title(short=True) for column in self.columns]
 
 
 Parts = Sequence[Table | str]

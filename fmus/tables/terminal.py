@@ -1,18 +1,21 @@
 """Cells as lines that fit a terminal. Standard library only.
 
 What is printed to a file or a pipe has no width: there a row stays on one line, so that `grep` and `diff` find it
-whole.
+whole; columns of numbers that would make the line longer than `PIPED` are left out.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Container, Sequence
 from itertools import zip_longest
 from textwrap import wrap
 from typing import TextIO
 
+PIPED = 120
+"""How long a line of a table in a file or a pipe may become, a text at its end apart."""
 GAP = "  "
 INDENT = "  "
 """Before the further lines of a cell on the left, so that they are not taken for a row."""
@@ -86,6 +89,40 @@ def laid_out(
     return [line for i, table in enumerate(tables) for line in ([""] if i else []) + table]
 
 
+def room_for(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], left: Container[int], names: int, most: int
+) -> tuple[list[int], list[str]]:
+    """The columns of a table that find room where rows stay on one line: all that are no numbers, and of these the
+    first ones.
+
+    Args:
+        headings: of the columns. rows: cells. left: indices of the columns that stand on the left.
+        names: how many columns from the first on name a row. most: length of a line; a text that ends it may be longer.
+
+    Returns:
+        Indices of the columns, and all headings, with line breaks where this makes room.
+    """
+    natural = [max(_width(cell) for cell in column) for column in zip(headings, *rows, strict=True)]
+    ends = len(headings) - 1 if len(headings) - 1 in left and len(headings) > names else len(headings)
+    pieces = [max(map(len, _pieces(heading))) for heading in headings]
+    least = [max([pieces[i], *(_width(row[i]) for row in rows)]) for i in range(len(headings))]
+    kept = [i for i in range(ends) if i in left or i < names]
+    for i in range(ends):
+        if i not in kept and (not kept or _total([least[j] for j in (*kept, i)]) <= most):
+            kept.append(i)
+    kept.sort()
+    widths = dict(zip(kept, _narrowed([natural[i] for i in kept], [least[i] for i in kept], most), strict=True))
+    broken = [
+        "\n".join(_broken(heading, widths.get(i, len(heading)), indented=False)) for i, heading in enumerate(headings)
+    ]
+    return [*kept, *range(ends, len(headings))], broken
+
+
+def _pieces(heading: str) -> list[str]:
+    """What a heading is broken into at most; a unit stays whole."""
+    return re.split(r"\s+|(?<=[._])", heading)
+
+
 def _width(cell: str) -> int:
     return max(map(len, cell.split("\n")))
 
@@ -97,10 +134,10 @@ def _total(widths: Sequence[int]) -> int:
 def _least(
     headings: Sequence[str], rows: Sequence[Sequence[str]], widths: Sequence[int], left: Container[int]
 ) -> list[int]:
-    """Widths that columns are not made narrower than: of numbers their headings are wrapped at their blanks."""
+    """Widths that columns are not made narrower than: of numbers their headings are wrapped."""
     cells = [max((_width(row[i]) for row in rows), default=0) for i in range(len(widths))]
-    words = [max(map(len, heading.split()), default=0) for heading in headings]
-    return [min(old, LEAST if i in left else max(cells[i], words[i])) for i, old in enumerate(widths)]
+    pieces = [max(map(len, _pieces(heading))) for heading in headings]
+    return [min(old, LEAST if i in left else max(cells[i], pieces[i])) for i, old in enumerate(widths)]
 
 
 def _narrowed(widths: Sequence[int], least: Sequence[int], width: int) -> list[int]:

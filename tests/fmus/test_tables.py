@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from math import inf, nan
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fmus.tables.notebook import paragraph_html
+from fmus.tables.numbers import DASH
 from fmus.tables.table import Column, Table, error_column, name_column, pairs_table, text_column
 from fmus.tables.terminal import paragraph
 
@@ -52,6 +55,53 @@ def test_without_a_width_a_row_is_a_line(table: Table) -> None:
     rule = any(column.title() for column in table.columns)
     assert len(lines) == len(table.rows) + 2 * rule * bool(table.rows)
     assert all(len(line) <= len(table.text(10_000)) for line in lines)
+
+
+@given(tables(), st.integers(30, 140))
+def test_in_a_pipe_a_row_is_a_line_and_numbers_without_room_are_named(table: Table, most: int) -> None:
+    piped = table.within(most, "see --json")
+    lines = replace(piped, notes=()).text().split("\n") if table else []
+    kept = [column.key for column in piped.columns]
+    left_out = [column for column in table.columns if column.key not in kept]
+    assert [column.key for column in table.columns if column not in left_out] == kept
+    assert all(column.kind == "number" and column.heading in piped.notes[0] for column in left_out)
+    assert [row.split() for row in lines[-len(table.rows) :]] == [" ".join(row).split() for row in piped.cells]
+    if piped.names and all(column.kind == "number" for column in piped.columns[piped.names :]):
+        names = replace(piped, columns=piped.columns[: piped.names], rows=[row[: piped.names] for row in piped.rows])
+        assert max(map(len, lines), default=0) <= max(most, *map(len, names.text().split("\n")))
+
+
+def test_of_the_numbers_the_first_ones_find_room() -> None:
+    columns = [name_column("run"), *(Column(f"e{i}", f"observer.error_{i}", "m") for i in range(9)), text_column("why")]
+    text = Table("t", columns, [["a", *range(9), "because " * 9]]).within(60, "see --json").text()
+    assert text.split("\n")[4:] == [
+        "a          0          1          2          3          4  " + ("because " * 9).rstrip(),
+        "4 more columns, see --json: " + ", ".join(f"observer.error_{i}" for i in range(5, 9)) + ".",
+    ]
+
+
+def test_a_line_is_as_long_as_is_allowed_and_no_longer() -> None:
+    table = Table("t", [name_column("run"), Column("abcdef", "abcdef"), Column("ghijkl", "ghijkl")], [["a", 1, 2]])
+    rows = [table.within(most, "").text().split("\n") for most in (17, 16)]
+    assert [len(lines[0]) for lines in rows] == [17, 9]
+
+
+@given(tables())
+def test_what_is_the_same_in_all_rows_stands_above_them(table: Table) -> None:
+    stated = replace(table, rows_are="runs")
+    shown, cells = stated.shown(), list(zip(*table.cells, strict=True)) if table else []
+    assert stated.data() == table.data() or "nan" in repr(table.data())
+    if len(table.rows) < 2 or not table.names:
+        assert shown is stated
+        return
+    for column, values in zip(table.columns, cells, strict=True):
+        is_kept = any(kept.key == column.key for kept in shown.columns)
+        assert is_kept == (column.kind == "name" or len(set(values)) > 1)
+        assert is_kept or (
+            column.heading.strip() in shown.lead and (values[0] == DASH or values[0].strip() in shown.lead)
+        )
+    assert shown.lead in stated.text()
+    assert paragraph_html(shown.lead) in stated.html()
 
 
 @given(tables())
