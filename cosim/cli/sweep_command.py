@@ -18,6 +18,7 @@ from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
 from cosim.studies.sampling_plans import MOST, Range, uniform
 from cosim.studies.sweep import Sweep
+from cosim.studies.sweep_files import PAGE
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
@@ -79,11 +80,13 @@ def execute(options: argparse.Namespace) -> Output:
     if options.by is not None:
         studies.write_groups(result, options.by, directory)
     table = result.shown() if options.by is None else studies.groups_table(result, options.by)
-    ending = f"{len(result) - len(result.failed)} of {len(result)} runs done: {directory}"
+    unmet = f", {result.unmet}" if result.unmet else ""
+    ending = f"{len(result) - len(result.failed)} of {len(result)} runs done{unmet}: {directory}"
     data = json.loads((directory / "index.json").read_text(encoding="utf-8"))
+    files = {"page": directory / PAGE}
     if result.failed:
-        return Output([table], data, code=_SOME_FAILED, verdict=ending, role="bad")
-    return Output([table], data, verdict=ending)
+        return Output([table], data, files, code=_SOME_FAILED, verdict=ending, role="bad")
+    return Output([table], data, files, verdict=ending, role="doubtful" if unmet else "good")
 
 
 def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:

@@ -5,6 +5,7 @@ measure over what was varied. Touches no file.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ from cosim.results.results_folder import REPORT
 from cosim.studies.measures import setting_text
 from cosim.studies.setting_units import setting_unit
 from fmus.tables.numbers import number
-from fmus.tables.table import Column, Table, name_column, text_column
+from fmus.tables.table import Column, Table
 
 if TYPE_CHECKING:
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
@@ -34,7 +35,7 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
     Args:
         result: the runs. directory: where the page will stand, which its links are relative to.
     """
-    recordings = _recordings(result)
+    recordings, table = _recordings(result), _table(result)
     names = list(dict.fromkeys(curve.name for recording in recordings for curve in recording.curves))
     about = f"What was varied: {', '.join(result.names)}. Click a run to see its page; drag on an axis to choose runs."
     more = "" if any(_link(run, directory) for run in result.runs) else " Of a single run: cosim open, and its folder."
@@ -46,7 +47,7 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
         recordings=recordings,
         panels=[PagePanel(name, [name], is_shown=place < _SHOWN) for place, name in enumerate(names)],
         sections=[
-            Section("Runs", [Rows(_table(result), [_link(run, directory) for run in result.runs])], is_open=True),
+            Section("Runs", [Rows(table, [_link(run, directory) for run in result.runs])], is_open=True),
             Section("What failed", [result.troubles()], mood="bad"),
         ],
     )
@@ -64,16 +65,16 @@ def _is_number(value: Any) -> bool:
 
 
 def _table(result: SweepRuns) -> Table:
-    """A row for each run: what was varied, the chosen measures, why it failed."""
-    settings = [
-        Column(n, n, setting_unit(result, n) or "", digits=6)
-        if all(_is_number(run.settings.get(n)) for run in result.runs)
-        else text_column(n, n, write=setting_text)
-        for n in result.names
+    """A row for each run: what was varied, what became of it, the chosen measures; numbers as such, which are sorted
+    and drawn.
+    """
+    shown = result.shown()
+    numbers = {name for name in result.names if all(_is_number(run.settings.get(name)) for run in result.runs)}
+    columns = [
+        Column(c.key, c.heading, setting_unit(result, c.key) or "", digits=6) if c.key in numbers else c
+        for c in shown.columns
     ]
-    columns = [name_column("run", "Run"), *settings, *result.columns, text_column("failure", "Failure")]
-    rows = [[row[column.key] for column in columns] for row in result.table()]
-    return Table("runs", columns, rows).filled({c.key for c in columns[:-1]})
+    return replace(shown, columns=columns)
 
 
 def _known(result: SweepRuns, measure: str) -> list[tuple[SweepRun, float]]:
@@ -89,7 +90,7 @@ def _measure(result: SweepRuns) -> Column | None:
 
 def _verdict(result: SweepRuns) -> PageVerdict:
     count, failed = len(result), len(result.failed)
-    text = f"{count - failed} of {count} runs came to their end."
+    text = f"{count - failed} of {count} runs came to their end{f', {result.unmet}' if result.unmet else ''}."
     column = _measure(result)
     values = [value for _, value in _known(result, column.key)] if column is not None else []
     diverged = count - failed - len(values) if column is not None else 0
@@ -99,7 +100,7 @@ def _verdict(result: SweepRuns) -> PageVerdict:
         text += f" {column.heading}: {middle}{unit} in the median, {low} to {high}{unit}."
     if diverged:
         text += f" In {diverged} it is no finite number."
-    return PageVerdict(text, "bad" if failed == count else "doubt" if failed or diverged else "good")
+    return PageVerdict(text, "bad" if failed == count else "doubt" if failed or diverged or result.unmet else "good")
 
 
 def _finding(result: SweepRuns) -> str:

@@ -24,6 +24,8 @@ SHARES: Mapping[str, tuple[str, str]] = {
 """Measures that are shares of counted things: name to those of the count and of the number in all."""
 RATES: Mapping[str, tuple[str, str]] = {"false_alarms_per_hour": ("false_alarms", "evaluated_time")}
 """Measures that are counts in an hour: name to those of the count and of the time [s]."""
+UNMET = "unmet_expectations"
+"""How many expectations of the scenario a run that came to its end does not meet; of a scenario that has some."""
 _ERROR_UNITS: Mapping[Quantity, str] = {"speed": "m/s", "position": "m"}
 _GAP_UNITS = {"gap_error_max": "m", "gap_error_time_max": "s"}
 _CONSISTENCY = ("nis", "nees", "nis_inside", "nees_inside")
@@ -56,7 +58,7 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
         recorded; NaN for a run that failed, whose errors are those of another interval of time, and where too few rows
         are judged. Where balises were read also ``observer.gap_error_max`` [m] and ``observer.gap_error_time_max`` [s],
         the largest position error at the end of a gap between two of them and the longest running time of one, and the
-        same of the plain odometer, under the name of its component.
+        same of the plain odometer, under the name of its component. Where the scenario has expectations also `UNMET`.
     """
     result, spec = outcome.result, outcome.spec
     measures: dict[str, float] = {}
@@ -73,6 +75,8 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
             failed = outcome.failure is not None
             measures[f"{observer}.{quantity}_error_max"] = nan if failed else size.max_abs
             measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms
+    if outcome.expectations and outcome.failure is None:
+        measures[UNMET] = float(len(outcome.unmet))
     return measures | detection_measures(outcome) | _gap_measures(outcome) | _consistency_measures(outcome)
 
 

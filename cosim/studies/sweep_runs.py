@@ -14,10 +14,11 @@ from cosim.results.optional import optional_module
 from cosim.results.result import Result
 from cosim.run.outcome import Outcome
 from cosim.runs.runnable import RunnableScenario
-from cosim.studies.measures import measure_unit, setting_text
+from cosim.studies.measures import UNMET, measure_unit, setting_text
 from fmus.tables.numbers import number
-from fmus.tables.table import Column, FirstScreen, Parts, Table, name_column
+from fmus.tables.table import Column, FirstScreen, Parts, Table, name_column, text_column
 
+_OUTCOME = text_column("outcome", "outcome", "Whether the run came to its end and met the scenario's expectations")
 _RANGES, _MEASURES = 2, 4
 """Measures whose range stands in the first sentence, and those whose values stand below it."""
 
@@ -48,6 +49,19 @@ class SweepRun(FirstScreen):
         settings = ", ".join(f"{name} = {setting_text(value)}" for name, value in self.settings.items())
         left: Parts = [] if self.outcome is None else self.outcome.first_screen()
         return [f"Run {self.number}: {settings or 'nothing varied'}.", self.failure or "", *left]
+
+    @property
+    def unmet(self) -> int:
+        """How many expectations of the scenario are not met."""
+        count = self.measures.get(UNMET, nan)
+        return 0 if isnan(count) else int(count)
+
+    @property
+    def ending(self) -> str:
+        """What became of it, in a few words."""
+        if self.failure is not None:
+            return "failed"
+        return f"{self.unmet} not met" if self.unmet else "done"
 
     @property
     def result(self) -> Result | None:
@@ -82,6 +96,12 @@ class SweepRuns(FirstScreen):
         return [run for run in self.runs if run.failure is not None]
 
     @property
+    def unmet(self) -> str:
+        """In how many runs expectations of the scenario are not met, in words; empty for none."""
+        count = sum(run.unmet > 0 for run in self.runs)
+        return f"{count} with expectations that are not met" if count else ""
+
+    @property
     def measures(self) -> list[str]:
         """Names of all measures, in order of appearance."""
         return list(dict.fromkeys(name for run in self.runs for name in run.measures))
@@ -95,7 +115,8 @@ class SweepRuns(FirstScreen):
         """
         chosen = self.scenario.table().report.measures
         if not chosen or not self.measures:
-            return [Column(name, name, self.unit(name) or "", digits=4) for name in self.measures]
+            shown = [name for name in self.measures if name != UNMET]  # which the outcome says
+            return [Column(name, name, self.unit(name) or "", digits=4) for name in shown]
         unknown = [c.measure for c in chosen if c.measure not in self.measures]
         if unknown:
             raise ScenarioError(f"report.measures: {unknown[0]!r} is none; {nearest(unknown[0], self.measures)}")
@@ -135,9 +156,14 @@ class SweepRuns(FirstScreen):
         return self._shown(self.columns)
 
     def _shown(self, measures: Sequence[Column]) -> Table:
-        columns = [*(name_column(name, name, write=setting_text) for name in ("run", *self.names)), *measures]
-        rows = [[row[column.key] for column in columns] for row in self.table()]
-        return Table("runs", columns, rows, notes=self.troubles())
+        names = [name_column(name, name, write=setting_text) for name in ("run", *self.names)]
+        columns = [*names, _OUTCOME, *measures]
+        endings = [run.ending for run in self.runs]
+        rows = [
+            [ending if column is _OUTCOME else row[column.key] for column in columns]
+            for row, ending in zip(self.table(), endings, strict=True)
+        ]
+        return Table("runs", columns, rows, notes=self.troubles(), bad={*endings} - {"done"}, rows_are="runs")
 
     def text(self) -> str:
         """The same as plain text."""
@@ -145,7 +171,8 @@ class SweepRuns(FirstScreen):
 
     def first_screen(self) -> Parts:
         """How many runs there are, what was varied, and between what the first of the measures lie; then the runs."""
-        done = f"{len(self.runs)} runs" + (f", {len(self.failed)} of which failed" if self.failed else "")
+        failed = f", {len(self.failed)} of which failed" if self.failed else ""
+        done = f"{len(self.runs)} runs{failed}{f', {self.unmet}' if self.unmet else ''}"
         ranges = [text for column in self.columns[:_RANGES] if (text := self._range(column))]
         sentence = f"{done}; varied: {', '.join(self.names) or 'nothing'}."
         more = len(self.columns) - _MEASURES

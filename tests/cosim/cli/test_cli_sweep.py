@@ -57,8 +57,9 @@ def test_a_sweep_prints_the_table_and_writes_every_run(
         main(["sweep", str(file), "--vary", "train.mass=70e3,80e3", "--vary", "stop=0.1,0.2", "--out", str(out)]) == 0
     )
     said = capsys.readouterr().out
-    assert said.splitlines()[0].split() == ["run", "train.mass", "stop"]
-    assert [line.split() for line in said.splitlines()[2:6]] == [
+    assert said.splitlines()[0] == "The same in all runs: outcome done."
+    assert said.splitlines()[1].split() == ["run", "train.mass", "stop"]
+    assert [line.split() for line in said.splitlines()[3:7]] == [
         ["0", "70000", "0.1"],
         ["1", "70000", "0.2"],
         ["2", "80000", "0.1"],

@@ -26,7 +26,7 @@ from cosim.report.page.run_statements import run_statements
 from cosim.report.page.run_verdict import observer_statuses
 from cosim.results.result import BaliseRecord, Result
 from cosim.run.outcome import Outcome
-from cosim.studies.measures import error_measures
+from cosim.studies.measures import UNMET, error_measures
 
 SPEC = ReportSpec(true_position="train.position", true_speed="train.speed", observers=["obs"])
 
@@ -186,7 +186,9 @@ def test_a_run_that_ends_before_anything_happens() -> None:
     assert [evaluated.passed for evaluated in outcome.expectations] == [False, False, False]
     assert all("0.5" in j.text or "nothing" in j.text or "no gap" in j.text for j in outcome.expectations)
     assert [("never moves" in w, "Not reached" in w) for w in outcome.warnings][-2:] == [(True, False), (False, True)]
-    assert all(np.isnan(value) for value in error_measures(outcome).values())
+    measures = error_measures(outcome)
+    assert measures.pop(UNMET) == 3.0
+    assert all(np.isnan(value) for value in measures.values())
 
 
 def test_error_sizes_themselves_count_every_row() -> None:

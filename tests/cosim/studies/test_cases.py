@@ -123,8 +123,8 @@ def test_shares_and_rates_are_of_all_that_was_counted() -> None:
 def test_columns_have_labels_units_and_factors(swept: SweepResult) -> None:
     column = {"measure": "way", "label": "w", "factor": 1000.0, "unit": "mm"}
     result = SweepResult(swept.scenario.copy().report(measures=[column]), swept.names, swept.runs)
-    assert "w [mm]" in result.text().splitlines()[0]
-    assert result.text().splitlines()[2].endswith(f"{1000 * swept[0].measures['way']:.0f}")
+    assert "w [mm]" in result.text().splitlines()[1]
+    assert result.text().splitlines()[3].endswith(f"{1000 * swept[0].measures['way']:.0f}")
     wrong = SweepResult(swept.scenario.copy().report(measures=["wey"]), swept.names, swept.runs)
     with pytest.raises(ScenarioError, match="did you mean 'way'"):
         wrong.text()

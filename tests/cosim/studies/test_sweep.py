@@ -71,6 +71,18 @@ def test_measures_are_the_errors_of_the_table_and_the_users_own(swept: SweepResu
     assert frame.index.name == "run"
 
 
+def test_a_run_that_misses_an_expectation_is_not_simply_done() -> None:
+    scenario = plant().expect("signal", signal="train.position", max=2.0)
+    result = scenario.vary({"train.effort": [0.0, 5e4, 9e4]}).run()
+    largest = [run.result.table["train.position"].max() for run in result.runs if run.result is not None]
+    assert [run.ending for run in result.runs] == ["1 not met" if x > 2.0 else "done" for x in largest]
+    assert {run.ending for run in result.runs} == {"1 not met", "done"}
+    page = sweep_page(result, Path())
+    assert page.verdict.mood == "doubt"
+    assert result.unmet in page.verdict.text
+    assert result.unmet in repr(result).splitlines()[0]
+
+
 def test_results_do_not_depend_on_the_number_of_workers() -> None:
     sweep = plant().vary([{"train.mass": 70e3}, {"stop": 0.1}, {"train.effort": -5e4}])
     done: list[tuple[int, int]] = []
