@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from cosim.report.live.live_page import LivePage, PageCurve, PagePanel, PageRecording, PageVerdict, Rows, Section
+from cosim.report.live.live_page import LivePage, Mood, PageCurve, PagePanel, PageRecording, PageVerdict, Rows, Section
 from cosim.results.results_folder import REPORT
-from cosim.studies.measures import setting_text
+from cosim.studies.measures import UNMET, setting_text
 from cosim.studies.setting_units import setting_unit
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, Table
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _MOST_LINES = 8
 """Combinations of the other values that are drawn as lines."""
+_SPREADS = 4  # components whose spread the verdict says
 _SHOWN = 2  # measures that are drawn at first
 _FEWEST = 5  # runs from which a rank correlation says something
 _STRONG = 0.6  # rank correlation that is named
@@ -37,8 +38,10 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
     """
     recordings, table = _recordings(result), _table(result)
     names = list(dict.fromkeys(curve.name for recording in recordings for curve in recording.curves))
-    about = f"What was varied: {', '.join(result.names)}. Click a run to see its page; drag on an axis to choose runs."
-    more = "" if any(_link(run, directory) for run in result.runs) else " Of a single run: cosim open, and its folder."
+    links, folders = [_link(run, directory) for run in result.runs], [_folder(run, directory) for run in result.runs]
+    click = "see its page" if any(links) else "see how its page is made" if any(folders) else ""
+    about = f"What was varied: {', '.join(result.names)}. Drag on an axis to choose runs."
+    more = f" Click a run to {click}." if click else " No results of a single run were kept."
     return LivePage(
         title=f"{result.scenario.name}: {len(result)} runs",
         verdict=_verdict(result),
@@ -47,17 +50,21 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
         recordings=recordings,
         panels=[PagePanel(name, [name], is_shown=place < _SHOWN) for place, name in enumerate(names)],
         sections=[
-            Section("Runs", [Rows(table, [_link(run, directory) for run in result.runs])], is_open=True),
+            Section("Runs", [Rows(table, links, folders)], is_open=True),
             Section("What failed", [result.troubles()], mood="bad"),
         ],
     )
 
 
+def _folder(run: SweepRun, directory: Path) -> str | None:
+    """Its results as seen from the page of the sweep, None where there are none beside it."""
+    return run.folder.name if run.folder is not None and run.folder.parent == directory else None
+
+
 def _link(run: SweepRun, directory: Path) -> str | None:
     """Its page as seen from that of the sweep, None where it has none."""
-    if run.folder is None or run.folder.parent != directory or not (run.folder / REPORT).exists():
-        return None
-    return f"{run.folder.name}/{REPORT}"
+    folder = _folder(run, directory)
+    return f"{folder}/{REPORT}" if folder is not None and (directory / folder / REPORT).exists() else None
 
 
 def _is_number(value: Any) -> bool:
@@ -71,7 +78,7 @@ def _table(result: SweepRuns) -> Table:
     shown = result.shown()
     numbers = {name for name in result.names if all(_is_number(run.settings.get(name)) for run in result.runs)}
     columns = [
-        Column(c.key, c.heading, setting_unit(result, c.key) or "", digits=6) if c.key in numbers else c
+        Column(c.key, c.heading, setting_unit(result, c.key) or "", write=setting_text) if c.key in numbers else c
         for c in shown.columns
     ]
     return replace(shown, columns=columns)
@@ -90,17 +97,48 @@ def _measure(result: SweepRuns) -> Column | None:
 
 def _verdict(result: SweepRuns) -> PageVerdict:
     count, failed = len(result), len(result.failed)
-    text = f"{count - failed} of {count} runs came to their end{f', {result.unmet}' if result.unmet else ''}."
+    text = f"{count - failed} of {count} runs came to their end"
+    text += f", {result.unmet}." if result.unmet else " and met all expectations." if _is_met(result) else "."
     column = _measure(result)
     values = [value for _, value in _known(result, column.key)] if column is not None else []
     diverged = count - failed - len(values) if column is not None else 0
-    if column is not None and values:
-        unit = f" {column.unit}" if column.unit else ""
-        low, middle, high = (column.cell(float(v)) for v in np.percentile(values, (0, 50, 100)))
-        text += f" {column.heading}: {middle}{unit} in the median, {low} to {high}{unit}."
-    if diverged:
-        text += f" In {diverged} it is no finite number."
-    return PageVerdict(text, "bad" if failed == count else "doubt" if failed or diverged or result.unmet else "good")
+    text += _spreads(result)
+    if diverged and column is not None:
+        text += f" In {diverged} {column.heading} is no finite number."
+    mood: Mood = "bad" if failed == count else "doubt" if failed or diverged or result.unmet else ""
+    return PageVerdict(text, "good" if not mood and _is_met(result) else mood)
+
+
+def _is_met(result: SweepRuns) -> bool:
+    """Whether the scenario has expectations, and all runs meet them."""
+    return all(run.measures.get(UNMET) == 0.0 for run in result.runs)
+
+
+def _spreads(result: SweepRuns) -> str:
+    """Between what the first measure lies over the runs, of each component that has it: the least extreme first."""
+    first = _measure(result)
+    found = []
+    for column in result.columns:
+        values = [value for _, value in _known(result, column.key)]
+        if first is not None and values and _kind(column) == _kind(first):
+            low, middle, high = (float(v) for v in np.percentile(values, (0, 50, 100)))
+            found.append((max(abs(low), abs(high)), column, low, middle, high))
+    if first is None or not found:
+        return ""
+    unit = f" {first.unit}" if first.unit else ""
+    if len(found) == 1:
+        _, column, *numbers = found[0]
+        low, middle, high = map(column.cell, numbers)
+        return f" {column.heading}: {middle}{unit} in the median, {low} to {high}{unit}."
+    found.sort(key=lambda entry: entry[0])
+    listed = [f"{c.key.rpartition('.')[0]} {c.cell(low)} to {c.cell(high)}{unit}" for _, c, low, _, high in found]
+    more = [f"{len(listed) - _SPREADS} more"] if len(listed) > _SPREADS else []
+    return f" {_kind(first)}: {', '.join([*listed[:_SPREADS], *more])}."
+
+
+def _kind(column: Column) -> str:
+    """What a column measures, of whatever component."""
+    return column.key.rpartition(".")[2]
 
 
 def _finding(result: SweepRuns) -> str:

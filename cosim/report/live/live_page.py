@@ -129,12 +129,14 @@ class Rows:
     """A table to explore: sorted by a click, filtered, with distributions and parallel coordinates of its numbers.
 
     Args:
-        table: the rows. links: a page for each row, relative to this one; None where there is none. plots: whether
+        table: the rows. links: a page for each row, relative to this one; None where there is none. folders: results
+            for each row, likewise; of one without a page a click shows the command that makes it. plots: whether
             distributions and parallel coordinates are drawn.
     """
 
     table: Table
     links: Sequence[str | None] = ()
+    folders: Sequence[str | None] = ()
     plots: bool = True
 
 

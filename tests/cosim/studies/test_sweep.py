@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,12 @@ from small_scenarios import small
 from cosim import Scenario
 from cosim.errors import ComparisonError, CosimError, OutputError, RunError, ScenarioError
 from cosim.master.master import Master
+from cosim.report.live.live_page import PageVerdict
 from cosim.results.results_folder import read_results
 from cosim.run.outcome import Outcome
 from cosim.runs.journal import JOURNAL, read_lines
 from cosim.studies.live_sweep import sweep_page
+from cosim.studies.measures import UNMET
 from cosim.studies.sampling_plans import uniform
 from cosim.studies.seed_runs import seed_study
 from cosim.studies.sweep_result import SweepResult
@@ -276,6 +279,18 @@ def test_who_interrupts_a_run_stops_the_sweep_and_keeps_what_is_done(
     assert read_results(tmp_path / "run_000").failure is None
 
 
+def test_the_verdict_names_every_component_that_has_the_measure_the_best_first(tmp_path: Path) -> None:
+    measures = [{"a.error": 1.0 * n, "b.error": -0.5 * n, "b.way": 9.0} for n in (1, 2)]
+    runs = [SweepRun(n, {"seed": n}, measures=own) for n, own in enumerate(measures)]
+    units = {"a.error": "m", "b.error": "m"}
+    page = sweep_page(SweepRuns(plant(), ["seed"], runs, units), tmp_path)
+    ending = "2 of 2 runs came to their end"
+    assert page.verdict == PageVerdict(f"{ending}. error: b -1.000 to -0.5000 m, a 1.000 to 2.000 m.", "")
+    met = [replace(run, measures={**run.measures, UNMET: 0.0}) for run in runs]
+    page = sweep_page(SweepRuns(plant(), ["seed"], met, units), tmp_path)
+    assert (page.verdict.mood, page.verdict.text.partition(". ")[0]) == ("good", f"{ending} and met all expectations")
+
+
 def test_the_page_names_what_failed_the_worst_run_and_what_it_goes_with(tmp_path: Path) -> None:
     runs = [SweepRun(n, {"train.mass": 1e3 * n}, measures={"error": float(n**2)}) for n in range(6)]
     infinite = SweepRun(7, {"train.mass": 7e3}, measures={"error": np.inf})
@@ -283,7 +298,7 @@ def test_the_page_names_what_failed_the_worst_run_and_what_it_goes_with(tmp_path
     page = sweep_page(SweepRuns(plant(), ["train.mass"], runs, {"error": "m"}), tmp_path)
     assert page.verdict.mood == "doubt"
     assert page.verdict.text.startswith("7 of 8 runs came to their end. error: 6.500 m in the median, 0 to 25.00 m.")
-    assert page.verdict.text.endswith("In 1 it is no finite number.")
+    assert page.verdict.text.endswith("In 1 error is no finite number.")
     assert page.finding.startswith("error is largest in run 5, 25.00 m: train.mass = 5000")
     assert page.finding.endswith("It rises with train.mass (rank correlation 1.0).")
     (recording,) = page.recordings

@@ -1,7 +1,7 @@
 // Tables that are explored: sorted by a click, filtered, with distributions and parallel coordinates of their numbers.
 
 const SVG = "http://www.w3.org/2000/svg";
-const MOST_AXES = 12, BINS = 24;
+const MOST_AXES = 12, BINS = 24, MOST_LETTERS = 24;
 
 const vector = (tag, attributes = {}, ...children) => {
   const made = document.createElementNS(SVG, tag);
@@ -18,6 +18,18 @@ function cellNumber(text, isNumber = true) {
   return (isNumber ? /^[-+]?[\d.]/ : /^[-+]?[\d.]+(e[-+]?\d+)?$/i).test(plain) ? parseFloat(plain) : NaN;
 }
 
+/** A name as nodes, so that it may be broken behind its dots and underlines. */
+const breakable = (name) => name.split(/(?<=[._])/).flatMap((part, i) => i ? [element("wbr"), part] : [part]);
+
+/** Folder of this page as a shell wants it, with what ends it. */
+function ownFolder() {
+  const path = decodeURIComponent(location.pathname).replace(/^\/([A-Za-z]:)/, "$1");
+  return location.protocol === "file:" ? path.slice(0, path.lastIndexOf("/") + 1) : "";
+}
+
+/** A word of a command, quoted where a shell would part it. */
+const quoted = (word) => /^[\w.\/:-]+$/.test(word) ? word : `"${word.replace(/["$`\\]/g, "\\$&")}"`;
+
 class ExploredTable {
   constructor(node) {
     this.node = node;
@@ -27,16 +39,22 @@ class ExploredTable {
     this.rows = [...this.table.tBodies].flatMap((body) => [...body.rows]).map((row) => {
       const texts = [...row.cells].map((cell) => (cell.firstChild?.textContent ?? "").trim());
       const numbers = texts.map((text, column) => cellNumber(text, this.heads[column]?.classList.contains("number")));
-      return {row, texts, numbers, link: row.querySelector("a")?.href};
+      const entry = {row, texts, numbers, link: row.querySelector("a")?.href, folder: row.dataset.folder};
+      if (entry.folder && !entry.link) {
+        const cell = row.cells[0], button = element("button", {type: "button", className: "link", title: "How its page is made", onclick: () => this.open(entry)}, ...cell.childNodes);
+        cell.replaceChildren(button);
+      }
+      return entry;
     });
+    this.offer = element("p", {className: "note offer screen-only", role: "status", hidden: true});
     this.brushes = new Map();
     this.heads.forEach((head, column) => {
-      const button = element("button", {type: "button", className: "sort", title: "Sort", onclick: () => this.sort(column)}, ...head.childNodes);
+      const button = element("button", {type: "button", className: "sort", title: "Sort", onclick: () => this.sort(column)}, ...breakable(this.names[column]));
       head.replaceChildren(button);
     });
     this.filter = element("input", {type: "search", ariaLabel: "Filter rows", placeholder: "filter: a word, or column < 0.5", oninput: () => this.show()});
     this.count = element("output", {});
-    node.prepend(element("div", {className: "bar screen-only"}, this.filter, this.count));
+    node.prepend(element("div", {className: "bar screen-only"}, this.filter, this.count), this.offer);
     if (node.hasAttribute("data-plots")) this.plot();
     this.show();
   }
@@ -95,12 +113,12 @@ class ExploredTable {
   }
 
   parallel() {
-    const gap = 110, height = 230, top = 34, bottom = height - 22, width = Math.max(gap * (this.axes.length - 1) + 120, 300);
+    const gap = 136, edge = 72, height = 230, top = 34, bottom = height - 22, width = Math.max(gap * (this.axes.length - 1) + 2 * edge, 300);
     const svg = vector("svg", {viewBox: `0 0 ${width} ${height}`, width, height, class: "parallel", role: "img", "aria-label": "Parallel coordinates: a line for each row; drag on an axis to choose rows"});
     const place = (axis, value) => bottom - (bottom - top) * (Math.min(Math.max(value, axis.low), axis.high) - axis.low) / (axis.high - axis.low);
     const last = this.axes.at(-1);
     for (const entry of this.rows) {
-      const points = this.axes.flatMap((axis, i) => Number.isNaN(entry.numbers[axis.column]) ? [] : [`${60 + gap * i},${place(axis, entry.numbers[axis.column])}`]);
+      const points = this.axes.flatMap((axis, i) => Number.isNaN(entry.numbers[axis.column]) ? [] : [`${edge + gap * i},${place(axis, entry.numbers[axis.column])}`]);
       entry.line = vector("polyline", {points: points.join(" "), class: "run"}, vector("title", {}, entry.texts.join(", ")));
       const share = (Math.min(entry.numbers[last.column], last.high) - last.low) / (last.high - last.low);
       entry.line.style.stroke = Number.isNaN(share) ? "#999999" : `color-mix(in oklab, #E69F00 ${Math.round(100 * share)}%, #0072B2)`;
@@ -111,24 +129,25 @@ class ExploredTable {
       entry.row.addEventListener("mouseleave", () => entry.line.classList.remove("lit"));
       svg.append(entry.line);
     }
-    this.axes.forEach((axis, i) => svg.append(this.axis(svg, axis, 60 + gap * i, top, bottom, i)));
+    this.axes.forEach((axis, i) => svg.append(this.axis(svg, axis, edge + gap * i, top, bottom)));
     return element("div", {className: "wide", tabIndex: 0, role: "region", ariaLabel: "Parallel coordinates"}, svg);
   }
 
-  /** What stands at an axis: without the component where no other axis is named so, and not too long. */
-  shortName(axis) {
-    const own = ({column}) => this.names[column].replace(/^[^. ]+\./, ""), name = this.names[axis.column];
-    const plain = this.axes.filter((other) => own(other) === own(axis)).length > 1 ? name : own(axis);
-    return plain.length > 24 ? `…${plain.slice(-23)}` : plain;
+  /** What stands at an axis, in one or two lines: the component only where another axis is named so, neither too long. */
+  axisTitle(axis) {
+    const parts = ({column}) => this.names[column].match(/^(?:([^. ]+)\.)?(.*)$/).slice(1), [component, own] = parts(axis);
+    const isShared = component && this.axes.filter((other) => parts(other)[1] === own).length > 1;
+    return (isShared ? [component, own] : [own]).map((line) => line.length > MOST_LETTERS ? `${line.slice(0, MOST_LETTERS - 1)}…` : line);
   }
 
   /** An axis on which rows are chosen by dragging; a click takes the choice back. */
-  axis(svg, axis, x, top, bottom, i) {
+  axis(svg, axis, x, top, bottom) {
     const brush = vector("rect", {x: x - 8, width: 16, y: top, height: 0, class: "brush"});
     const strip = vector("rect", {x: x - 14, width: 28, y: top - 4, height: bottom - top + 8, class: "strip"});
-    const name = this.names[axis.column], short = this.shortName(axis);
+    const name = this.names[axis.column], title = this.axisTitle(axis);
     const text = (y, content, style = "middle") => vector("text", {x, y, "text-anchor": style}, content);
-    const group = vector("g", {class: "axis"}, vector("line", {x1: x, x2: x, y1: top, y2: bottom}), text(i % 2 ? 11 : 22, short), text(bottom + 14, shown(axis.low, 3)),
+    const lines = title.map((line, k) => text(top - 11 - 12 * (title.length - 1 - k), line));
+    const group = vector("g", {class: "axis"}, vector("line", {x1: x, x2: x, y1: top, y2: bottom}), ...lines, text(bottom + 14, shown(axis.low, 3)),
       vector("text", {x: x + 4, y: top + 10}, shown(axis.high, 3)), brush, strip, vector("title", {}, `${name}: drag to choose`));
     strip.addEventListener("pointerdown", (down) => {
       down.preventDefault();
@@ -153,7 +172,7 @@ class ExploredTable {
     const node = element("div", {className: "distributions"}), width = 150, height = 60;
     const drawings = this.axes.map((axis) => {
       const svg = vector("svg", {viewBox: `0 0 ${width} ${height + 14}`, width, height: height + 14, role: "img", "aria-label": `Distribution of ${this.names[axis.column]}`});
-      node.append(element("figure", {}, svg, element("figcaption", {textContent: this.names[axis.column]})));
+      node.append(element("figure", {}, svg, element("figcaption", {}, ...breakable(this.names[axis.column]))));
       return svg;
     });
     this.bars = () => this.axes.forEach((axis, i) => {
@@ -166,9 +185,21 @@ class ExploredTable {
     return node;
   }
 
+  /** Show the page of a row, or the command that makes it. */
   open(entry) {
     if (entry.link) location.href = entry.link;
+    else if (entry.folder) this.showCommand(entry);
     else entry.row.scrollIntoView({block: "center"});
+  }
+
+  showCommand({row, texts, folder}) {
+    const command = `cosim open ${quoted(`${ownFolder()}${folder}`)}`, code = element("code", {textContent: command});
+    const copy = element("button", {type: "button", textContent: "copy", onclick: () => navigator.clipboard?.writeText(command).then(() => { copy.textContent = "copied"; })});
+    this.offer.replaceChildren(`The page of ${this.names[0].toLowerCase()} ${texts[0]} is made and opened by `, code, " ", copy, " — once it is there: ",
+      element("a", {href: `${folder}/report.html`, textContent: `${folder}/report.html`}));
+    this.offer.hidden = false;
+    for (const {row: other} of this.rows) other.classList.toggle("lit", other === row);
+    this.offer.scrollIntoView({block: "nearest"});
   }
 }
 
