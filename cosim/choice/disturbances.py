@@ -121,21 +121,28 @@ def drawn(number: int, seed: int, journey: Journey, size: float = 1.0) -> Distur
 
 
 def _slopes(rng: np.random.Generator, journey: Journey, size: float) -> list[Slope]:
-    """Stretches of a tenth to a third of the way, at most 2 km, each with a gradient of its own."""
-    way = np.maximum.accumulate(journey.position) - journey.position[0]
+    """Stretches of a tenth to a third of the track, at most 2 km, each with its own gradient, also on the way back."""
+    place = journey.position - np.min(journey.position)
+    track = float(np.max(place))
     edges = [0.0]
-    while edges[-1] < way[-1] and len(edges) <= 2 * _MOST:
-        edges.append(edges[-1] + min(rng.uniform(0.1, 0.33) * way[-1], rng.uniform(500.0, 2000.0)))
-    reached = [float(journey.time[min(int(np.searchsorted(way, edge)), len(way) - 1)]) for edge in edges]
-    reached[-1] = float(journey.time[-1])
+    while edges[-1] < track and len(edges) <= 2 * _MOST:
+        edges.append(edges[-1] + min(rng.uniform(0.1, 0.33) * track, rng.uniform(500.0, 2000.0)))
     gradients = size * 8e-3 * rng.uniform(-1.0, 1.0, len(edges))
-    pairs = zip(reached, reached[1:], gradients, strict=False)
-    return [Slope(a, b - a, float(gradient)) for a, b, gradient in pairs if b > a]
+    if len(edges) < 2:
+        return []
+    stretch = np.searchsorted(edges[1:-1], place, side="right")
+    rows = [0, *(np.flatnonzero(np.diff(stretch)) + 1).tolist()]
+    reached = [*journey.time[rows].tolist(), float(journey.time[-1])]
+    return [
+        Slope(onset, end - onset, float(gradients[stretch[row]]))
+        for row, onset, end in zip(rows, reached, reached[1:], strict=False)
+        if end > onset
+    ]
 
 
 def _faults(rng: np.random.Generator, journey: Journey, size: float) -> list[OdometerFault]:
     """Jams while the train brakes, skids while it pulls, in the order of time and apart from each other."""
-    moving = journey.speed > _MOVES
+    moving = np.abs(journey.speed) > _MOVES
     pace = _accelerations(journey)
     jams = _instants(rng, journey.time[moving & (pace < _BRAKES)], every=15.0)
     skids = _instants(rng, journey.time[moving & (pace > _PULLS)], every=40.0)
@@ -149,8 +156,9 @@ def _faults(rng: np.random.Generator, journey: Journey, size: float) -> list[Odo
 
 
 def _accelerations(journey: Journey) -> np.ndarray:
-    """Mean acceleration over the second around each row [m/s2], shape (rows,)."""
-    before, after = (np.interp(journey.time + shift, journey.time, journey.speed) for shift in (-0.5, 0.5))
+    """Mean growth of the speed, forwards or backwards, over the second around each row [m/s2], shape (rows,)."""
+    pace = np.abs(journey.speed)
+    before, after = (np.interp(journey.time + shift, journey.time, pace) for shift in (-0.5, 0.5))
     return np.asarray(after - before)
 
 

@@ -9,8 +9,12 @@ from typing import Any
 from cosim.choice.candidates import BenchmarkCandidate
 from cosim.choice.disturbances import GRAVITY, Disturbance, OdometerFault
 from cosim.choice.known_parameters import MASS, Known
-from cosim.choice.playback import ScenarioParts
+from cosim.choice.playback import ScenarioParts, connection
+from cosim.coupling.connection import Link
+from cosim.coupling.transformation import Transformation
 from cosim.run.component_models import make_system, values_in_use
+from cosim.run.connections import parse_connections, recorded_link, transformation
+from cosim.scenario.scenario_tables import ConnectionTable
 from cosim.starter.train_starter import DAVIS
 
 _EFFORT, _WHEEL, _ODOMETER = "disturbed_effort", "disturbed_wheel", "disturbed_odometer"
@@ -21,14 +25,21 @@ class _DisturbedChannel:
     """What a signal passes between the recording and the observers.
 
     Args:
-        source: the recorded signal. output: what observers hear in its place. components: tables by name.
+        link: from the recording, as observers hear it without a disturbance: what is disturbed is in their units.
+        output: what observers hear in its place. components: tables by name.
         connections: from the source to the output.
     """
 
-    source: str
+    link: Link
     output: str
     components: Mapping[str, Mapping[str, Any]]
     connections: Sequence[Any]
+
+    def moved(self, line: str | dict[str, Any]) -> str | dict[str, Any]:
+        """A connection from the output in place of the recorded signal."""
+        (link,) = parse_connections([line if isinstance(line, str) else ConnectionTable.model_validate(line)], "")
+        left = transformation(link).instead_of(transformation(self.link))
+        return connection((self.output, link[1]) if left == Transformation() else (self.output, link[1], left), link[1])
 
 
 def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> list[_DisturbedChannel]:
@@ -40,14 +51,18 @@ def channels(disturbance: Disturbance, parts: ScenarioParts, known: Known) -> li
     found = []
     if disturbance.slopes and "effort" in parts.template:
         mass = known[MASS][0] if MASS in known else 1.0
-        found.append(_effort_channel(parts.template["effort"][0], disturbance, mass))
+        found.append(
+            _effort_channel(recorded_link(parts.template["effort"], parts.table, parts.folder), disturbance, mass)
+        )
     if "odometer" in parts.template and (disturbance.faults or disturbance.noise or disturbance.wheel != 1.0):
         period = known["odometer_period"][0] if "odometer_period" in known else parts.table.step
-        found.append(_odometer_channel(parts.template["odometer"][0], disturbance, period))
+        found.append(
+            _odometer_channel(recorded_link(parts.template["odometer"], parts.table, parts.folder), disturbance, period)
+        )
     return found
 
 
-def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> _DisturbedChannel:
+def _effort_channel(link: Link, disturbance: Disturbance, mass: float) -> _DisturbedChannel:
     """On a slope a train of the same motion needs ``m g i`` more."""
     slopes = disturbance.slopes
     stated = {
@@ -57,20 +72,23 @@ def _effort_channel(source: str, disturbance: Disturbance, mass: float) -> _Dist
     }
     options = {"fault_count": len(slopes), "unit": "N"}
     table = {"model": "signal_fault", "options": options, "parameters": stated}
-    return _DisturbedChannel(source, f"{_EFFORT}.reading", {_EFFORT: table}, [f"{source} -> {_EFFORT}.healthy"])
+    heard = connection(link, f"{_EFFORT}.healthy")
+    return _DisturbedChannel(link, f"{_EFFORT}.reading", {_EFFORT: table}, [heard])
 
 
-def _odometer_channel(source: str, disturbance: Disturbance, period: float) -> _DisturbedChannel:
+def _odometer_channel(link: Link, disturbance: Disturbance, period: float) -> _DisturbedChannel:
     """A wheel that jams and skids, and an odometer that is worn and noisy."""
     faults = disturbance.faults or (OdometerFault(0.0, 0.0, 0.0, -1.0),)
-    stated = {f"fault_{key}": [getattr(fault, key) for fault in faults] for key in ("onset", "length", "depth", "kind")}
-    wheel = {"model": "wheel_fault", "options": {"cause": "stated", "fault_count": len(faults)}, "parameters": stated}
+    drawn = {f"fault_{key}": [getattr(fault, key) for fault in faults] for key in ("onset", "length", "depth", "kind")}
+    wheel = {"model": "wheel_fault", "options": {"cause": "stated", "fault_count": len(faults)}, "parameters": drawn}
     odometer = {"model": "odometer", "parameters": {"sample_period": period, "noise_std": disturbance.noise}}
+    stated = transformation(link)
+    worn = replace(stated, factor=disturbance.wheel * stated.factor, offset=disturbance.wheel * stated.offset)
     lines = [
-        {"from": source, "to": f"{_WHEEL}.speed", "factor": disturbance.wheel},
+        connection((link[0], "", worn), f"{_WHEEL}.speed"),
         f"{_WHEEL}.wheel_speed -> {_ODOMETER}.wheel_speed",
     ]
-    return _DisturbedChannel(source, f"{_ODOMETER}.reading", {_WHEEL: wheel, _ODOMETER: odometer}, lines)
+    return _DisturbedChannel(link, f"{_ODOMETER}.reading", {_WHEEL: wheel, _ODOMETER: odometer}, lines)
 
 
 def disturbed(data: dict[str, Any], found: Sequence[_DisturbedChannel], disturbance: Disturbance) -> dict[str, Any]:
@@ -80,34 +98,39 @@ def disturbed(data: dict[str, Any], found: Sequence[_DisturbedChannel], disturba
         data: tables that play a recording back. found: the channels. disturbance: what is wrong.
     """
     sources = {_source(line) for line in data["connections"]}
-    found = [channel for channel in found if channel.source in sources]
-    outputs = {channel.source: channel.output for channel in found}
+    by_source = {channel.link[0]: channel for channel in found if channel.link[0] in sources}
     changed = dict(data)
-    changed["components"] = data["components"] | {n: dict(t) for c in found for n, t in c.components.items()}
+    tables = {name: dict(table) for channel in by_source.values() for name, table in channel.components.items()}
+    changed["components"] = data["components"] | tables
     changed["connections"] = [
-        *(_moved(line, outputs) for line in data["connections"]),
-        *(x for c in found for x in c.connections),
+        *(
+            by_source[source].moved(line) if (source := _source(line)) in by_source else line
+            for line in data["connections"]
+        ),
+        *(line for channel in by_source.values() for line in channel.connections),
     ]
     if "network" in data:
-        network = data["network"]
-        nodes = {node: [outputs.get(name, name) for name in names] for node, names in network["nodes"].items()}
-        scales = {outputs.get(name, name): value for name, value in network.get("scales", {}).items()}
-        loss = min(network.get("loss_fraction", 0.0) + disturbance.loss, 0.9)
-        changed["network"] = network | {"nodes": nodes, "scales": scales, "loss_fraction": loss}
+        changed["network"] = _disturbed_network(data["network"], by_source, disturbance)
     return changed
+
+
+def _disturbed_network(
+    network: dict[str, Any], found: Mapping[str, _DisturbedChannel], disturbance: Disturbance
+) -> dict[str, Any]:
+    """The network table with the outputs of the channels in place of the signals, and more packets lost."""
+    outputs = {source: channel.output for source, channel in found.items()}
+    nodes = {node: [outputs.get(name, name) for name in names] for node, names in network["nodes"].items()}
+    scales = {
+        outputs.get(name, name): value * (transformation(found[name].link).factor if name in found else 1.0)
+        for name, value in network.get("scales", {}).items()
+    }
+    loss = min(network.get("loss_fraction", 0.0) + disturbance.loss, 0.9)
+    return network | {"nodes": nodes, "scales": scales, "loss_fraction": loss}
 
 
 def _source(line: str | dict[str, Any]) -> str:
     """Where a connection comes from."""
     return str(line["from"]) if isinstance(line, dict) else line.partition(" -> ")[0]
-
-
-def _moved(line: str | dict[str, Any], outputs: Mapping[str, str]) -> str | dict[str, Any]:
-    """A connection from what observers hear in place of the recorded signal."""
-    source = _source(line)
-    if isinstance(line, dict):
-        return line | {"from": outputs.get(source, source)}
-    return outputs.get(source, source) + line.removeprefix(source)
 
 
 def believing(candidate: BenchmarkCandidate, disturbance: Disturbance) -> BenchmarkCandidate:

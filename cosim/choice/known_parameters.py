@@ -15,6 +15,7 @@ from cosim.choice.playback import ScenarioParts
 from cosim.evaluation.roles import recorded
 from cosim.results.result import Result
 from cosim.run.component_models import make_declared, make_system, values_in_use
+from cosim.run.connections import recorded_link, transformation
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from cosim.starter.guessed_signal import in_si
@@ -85,7 +86,7 @@ def derived_parameters(known: Known, parts: ScenarioParts, run: Result) -> dict[
     if period is not None:
         found.setdefault(_PERIOD, (period, "changes in the recorded run"))
     if MASS not in found and speed is not None and "effort" in parts.template:
-        mass = _fitted_mass(run.time, speed, recorded(run, parts.template["effort"][0]))
+        mass = _fitted_mass(run.time, speed, _heard(parts, run, "effort"))
         if mass is not None:
             found[MASS] = mass, "fitted to effort and speed of the recorded run; check it"
     if MASS in found:
@@ -186,6 +187,13 @@ def _seen_period(run: Result, name: str) -> float | None:
     return round(float(np.median(np.diff(changes))), 9) if len(changes) > 2 else None
 
 
+def _heard(parts: ScenarioParts, run: Result, name: str) -> np.ndarray | None:
+    """What observers hear as this input in a recorded run, in their unit; None where it is not recorded."""
+    link = recorded_link(parts.template[name], parts.table, parts.folder)
+    values, stated = recorded(run, link[0]), transformation(link)
+    return None if values is None else stated.factor * values + stated.offset
+
+
 def _fitted_mass(time: np.ndarray, speed: np.ndarray, effort: np.ndarray | None) -> float | None:
     """Mass with which efforts and speeds go together, with the resistance that is usual for it [kg]; None for none.
 
@@ -200,8 +208,9 @@ def _fitted_mass(time: np.ndarray, speed: np.ndarray, effort: np.ndarray | None)
     if len(grid) < 3:
         return None
     way = np.interp(grid, time, np.concatenate(([0.0], np.cumsum(effort[:-1] * np.diff(time)))))
-    v = np.interp(grid, time, speed)
-    push, mean = np.diff(way), 0.5 * (v[1:] + v[:-1])
+    forwards = -1.0 if np.sum(speed) < 0.0 else 1.0
+    v = forwards * np.interp(grid, time, speed)
+    push, mean = forwards * np.diff(way), 0.5 * (v[1:] + v[:-1])
     per_mass = np.diff(v) + sum(share * mean**power for power, share in enumerate(usual_resistance(1.0).values()))
     moving = mean > _MOVING
     weight = float(np.sum(per_mass[moving] ** 2))

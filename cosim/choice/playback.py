@@ -17,7 +17,7 @@ from cosim.coupling.connection import Link
 from cosim.errors import ScenarioError
 from cosim.run.balise_service import BALISE_EVENT
 from cosim.run.component_models import make_declared
-from cosim.run.connections import parse_connections
+from cosim.run.connections import parse_connections, recorded_link
 from cosim.run.described_components import describe_component
 from cosim.run.signal_roles import ROLES, roles_of_balises
 from cosim.scenario.scenario_tables import ComponentTable
@@ -53,13 +53,15 @@ class ScenarioParts:
     Args:
         table: the scenario.
         observers: names of those that estimate position or speed of the train. plant: names of the plant side.
-        links: all connections. effort: where the effort comes from of a train that calls it otherwise; None for none.
+        links: all connections. folder: start of relative paths.
+        effort: where the effort comes from of a train that calls it otherwise; None for none.
     """
 
     table: ScenarioTable
     observers: tuple[str, ...]
     plant: tuple[str, ...]
     links: tuple[Link, ...]
+    folder: Path
     effort: str | None = None
 
     @property
@@ -104,7 +106,8 @@ class ScenarioParts:
         """
         found: dict[str, Link] = {}
         if self.odometer is not None and self.odometer.partition(".")[0] in self.plant:
-            found["odometer"] = (self.odometer, "odometer")
+            heard = (link for link in self.links if link[0] == self.odometer and link[1].endswith(".odometer"))
+            found["odometer"] = next(heard, (self.odometer, "odometer"))
         for name in (*self.observers, *self.plant):
             for signal, link in self.sources(name).items():
                 if link[0].partition(".")[0] in self.plant:
@@ -129,7 +132,7 @@ def find_parts(scenario: Scenario) -> ScenarioParts:
     observers = tuple(name for name in table.components if name != plant and _is_observer(scenario, table, name))
     roots = [n for n, t in table.components.items() if n not in observers and t.observer is None]
     roots += [link[0].partition(".")[0] for link in links if link[1].partition(".")[0] in observers]
-    parts = ScenarioParts(table, observers, _ancestors(roots, links, table.components), links)
+    parts = ScenarioParts(table, observers, _ancestors(roots, links, table.components), links, scenario.folder)
     return replace(parts, effort=_effort_of_fmu(scenario, parts))
 
 
@@ -221,7 +224,9 @@ def playback_scenario(
         "certificates": "ignore",
         "components": _recordings(parts, folder, listeners) | {one.name: _table(one.table) for one in listeners},
         "connections": [
-            connection(link, f"{one.name}.{signal}") for one in listeners for signal, link in one.sources.items()
+            connection(recorded_link(link, table, parts.folder), f"{one.name}.{signal}")
+            for one in listeners
+            for signal, link in one.sources.items()
         ],
         "master": _played_master(table),
         "report": _roles(table, names),

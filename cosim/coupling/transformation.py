@@ -31,6 +31,22 @@ class Transformation:
             return factor, offset
         return self.factor * factor, self.factor * offset + self.offset
 
+    def of_converted(self, factor: float, offset: float) -> Transformation:
+        """The same for a source that was converted already, ``factor * source + offset``.
+
+        Args:
+            factor, offset: of that conversion.
+        """
+        if self.convert_units or (factor, offset) == (1.0, 0.0):
+            return self
+        table = tuple((factor * source + offset, target) for source, target in self.table)
+        return Transformation(*self.after(1.0 / factor, -offset / factor), False, table)
+
+    def instead_of(self, other: Transformation) -> Transformation:
+        """What is left to be done of it where the other linear transformation was done already."""
+        ratio = self.factor / other.factor
+        return Transformation(ratio, self.offset - ratio * other.offset, self.convert_units, self.table)
+
 
 def as_affine(table: Mapping[float, float], domain: frozenset[float]) -> tuple[float, float] | None:
     """``(factor, offset)`` that does the same as a table on every value of a finite domain, or None where there is

@@ -68,3 +68,14 @@ def test_what_acted_is_named_by_the_fault_before_it() -> None:
     assert found.cause(13.0) == "after a wheel that jams at 10 s"
     assert found.cause(31.0) == "after a wheel that skids at 30 s"
     assert found.cause(25.0) == ""
+
+
+@given(JOURNEYS, st.integers(0, 10**6), st.integers(1, 9))
+def test_a_train_that_runs_backwards_is_disturbed_as_one_that_runs_forwards(
+    way: Journey, seed: int, number: int
+) -> None:
+    back = drawn(number, seed, Journey(way.time, -way.position, -way.speed))
+    ahead = drawn(number, seed, way)
+    assert back.faults == ahead.faults
+    assert len(back.slopes) > 0
+    assert len({slope.gradient for slope in back.slopes}) <= len({slope.gradient for slope in ahead.slopes}) + 1

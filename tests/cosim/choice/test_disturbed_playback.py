@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from small_scenarios import small
+from test_fmus.build import linear_fmu
 
+from cosim import Scenario
 from cosim.choice.benchmark import benchmark_observers
 from cosim.choice.candidates import find_candidates
 from cosim.choice.disturbances import GRAVITY, Disturbance, Journey, OdometerFault, Slope
@@ -71,7 +74,8 @@ def test_observers_believe_in_another_mass_also_where_it_is_their_default() -> N
     assert "mass" not in plain
 
 
-def test_the_mass_of_a_train_that_nobody_states_is_fitted_to_its_run() -> None:
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_mass_of_a_train_that_nobody_states_is_fitted_to_its_run(sign: float) -> None:
     scenario = small()
     parts = replace(find_parts(scenario), observers=())
     time = np.arange(0.0, 60.0, 0.1)
@@ -82,11 +86,11 @@ def test_the_mass_of_a_train_that_nobody_states_is_fitted_to_its_run() -> None:
     table = np.empty(len(time), dtype=[("time", float), *((name, float) for name in names)])
     table["time"] = time
     for name, values in zip(names, (np.cumsum(speed) * 0.1, speed, effort, speed), strict=True):
-        table[name] = values
+        table[name] = sign * values
     found = derived_parameters({}, parts, Result(table, [SignalInfo(name) for name in names]))
     assert found["mass"][0] == pytest.approx(mass, rel=0.02)
     assert found["davis_a"][0] == pytest.approx(0.01 * found["mass"][0])
-    assert found["estimated_speed"][0] == speed[0]
+    assert found["estimated_speed"][0] == sign * speed[0]
     assert found["odometer_period"][0] == pytest.approx(0.1)
     stated = stated_parameters(scenario, parts)
     assert derived_parameters(stated, parts, Result(table, []))["mass"][0] == 90e3
@@ -102,3 +106,62 @@ def test_a_journey_is_what_it_says() -> None:
     benchmark_observers(small(), ["odometer_reset"], disturb=seen)
     assert found[0].time[-1] == pytest.approx(0.5)
     assert found[0].position[-1] == pytest.approx(5.0, abs=0.1)
+
+
+MASS, PULL = 90e3, 45e3  # [kg], [N]
+SIGNALS = {
+    "SI": ("m/s", "N", 1.0, 1.0, {}, {}),
+    "declared": ("km/h", "kN", 3.6, 1e-3, {}, {}),
+    "declared, taken as numbers": (
+        *("km/h", "kN", 3.6, 1e-3),
+        {"factor": 1.0 / 3.6, "units": "ignore"},
+        {"factor": 1e3, "units": "ignore"},
+    ),
+    "without a unit": ("", "", 3.6, 1e-3, {"factor": 1.0 / 3.6}, {"factor": 1e3}),
+}
+
+
+def point_mass(folder: Path, name: str, sign: float) -> Scenario:
+    """A mass that is pulled from 10 m/s on, forwards or backwards, with its odometer and effort in units of a kind."""
+    speed_unit, effort_unit, speed, effort, read, pull = SIGNALS[name]
+    fmu = linear_fmu(
+        *(folder, "mass", [[0.0, 1.0], [0.0, 0.0]], [[0.0], [1.0 / MASS]]),
+        *([[1.0, 0.0], [0.0, 1.0], [0.0, speed], [0.0, 0.0]], [[0.0], [0.0], [0.0], [effort]]),
+        inputs=["pull"],
+        outputs=["position", "speed", "odometer", "effort"],
+        x0=[0.0, 10.0 * sign],
+        u0=[PULL * sign],
+        units={"position": "m", "speed": "m/s"}
+        | {n: unit for n, unit in (("odometer", speed_unit), ("effort", effort_unit)) if unit},
+    )
+    scenario = Scenario(stop=12.0, step=0.05).add("mass", fmu=str(fmu))
+    stated = {"mass": MASS, "estimated_speed": 10.0 * sign, "odometer_period": 0.05}
+    scenario.add("observer", observer="quasi_lpv_uio", parameters=stated, **{"as": "block3"})
+    scenario.connect("mass.odometer -> observer.odometer", **read).connect("mass.effort -> observer.effort", **pull)
+    scenario.balises(
+        position="mass.position", speed="mass.speed", layout="positions", positions=sorted([40.0 * sign, 80.0 * sign])
+    )
+    return scenario.report(true_position="mass.position", true_speed="mass.speed", odometer="mass.odometer")
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["forwards", "backwards"])
+@pytest.mark.parametrize("name", [name for name in SIGNALS if name != "SI"])
+def test_what_observers_hear_does_not_depend_on_the_units_of_the_plant(name: str, sign: float, tmp_path: Path) -> None:
+    """Own observers, shipped ones and their disturbances, up to the rounding of a factor on each number."""
+    slope, fault = Slope(2.0, 6.0, 5e-3), OdometerFault(5.0, 1.0, 0.5, 1.0)
+    wrong = Disturbance(mass=1.1, wheel=1.01, slopes=(slope,), faults=(fault,))
+    asked = ["observer", "odometer_reset", "decaying_innovation_cdo:balise_holes"]
+    paths = [tmp_path / kind for kind in ("SI", "other")]
+    for path in paths:
+        path.mkdir()
+    right, other = (
+        benchmark_observers(point_mass(path, kind, sign), asked, disturb=always(wrong))
+        for path, kind in zip(paths, ("SI", name), strict=True)
+    )
+    live = point_mass(paths[1], name, sign).run(progress=False)
+    assert live["observer.speed"][0] == pytest.approx(10.0 * sign)
+    for score in right.scores:
+        for signal in ("position", "speed"):
+            before, after = (b.outcomes[score.name][f"{score.name}.{signal}"] for b in (right, other))
+            assert after == pytest.approx(before, rel=1e-9, abs=1e-9)
