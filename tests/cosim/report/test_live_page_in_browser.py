@@ -14,6 +14,7 @@ from browser import DESKTOP, PHONE, check_page
 from live_pages import SPIKE, TIME, explored_page, overlaid_page, written
 from playwright.sync_api import Page
 
+from cosim.report.live import page_data
 from cosim.report.live.live_page import LivePage, PageCurve, PagePanel, PageRecording, PageVerdict
 
 pytestmark = pytest.mark.browser
@@ -172,6 +173,50 @@ def test_the_difference_of_two_runs(tmp_path: Path) -> None:
         page.mouse.move(place["x"] + 0.4 * place["width"], place["y"] + 30)
         found = values(page)["train.position: second − first"]
         assert float(found.split()[0]) == pytest.approx(40.0, abs=0.2)
+
+
+def subtract(page: Page, first: str, second: str) -> str:
+    """Ask for the difference of two signals; what is wrong with it."""
+    page.locator("details", has_text="Difference of two signals").last.evaluate("(node) => { node.open = true; }")
+    page.get_by_label("first signal", exact=True).fill(first)
+    page.get_by_label("minus second signal").fill(second)
+    form = page.locator("form.difference")
+    form.evaluate("(node) => { node.querySelector('[role=status]').textContent = '...'; }")
+    form.get_by_role("button", name="draw").click()
+    page.wait_for_function("document.querySelector('form.difference [role=status]').textContent !== '...'")
+    return form.get_by_role("status").inner_text()
+
+
+@pytest.mark.parametrize("room", [page_data.ROOM, 1])
+def test_the_difference_of_two_signals_of_a_run(room: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One is .001 m/s larger than the other; also where a page has room for extremes alone."""
+    monkeypatch.setattr(page_data, "ROOM", room)
+    monkeypatch.setattr(page_data, "ROOM_A_ROW", 0)
+    with opened(explored_page(), tmp_path) as page:
+        assert subtract(page, "observer.speed", "train.speed") == ""
+        name = "observer.speed − train.speed"
+        assert page.locator("figcaption b").first.inner_text() == name
+        curve = f"{EXPLORER}.curvesOf('{name}')[0]"
+        np.testing.assert_allclose(page.evaluate(f"Array.from({curve}.y)"), 1e-3, atol=2e-6)
+        assert page.evaluate(f"{curve}.whole") == (room > 1)
+        assert page.evaluate(f"{EXPLORER}.charts[0].all[0].x.length === {curve}.y.length")
+        assert page.evaluate(f"Object.keys({EXPLORER}.charts[0].limits)") == ["m/s"]
+        place = plot(page)
+        page.mouse.move(place["x"] + 0.4 * place["width"], place["y"] + 30)
+        assert values(page)[name].endswith(" m/s")
+        count = page.locator("figure.panel").count()
+        assert subtract(page, "train.speed", "train.position") == (
+            "train.speed is in m/s, train.position in m: a difference needs two signals of one unit."
+        )
+        assert subtract(page, "train.sped", "train.speed") == "No signal is named train.sped."
+        assert subtract(page, "", "") == "Choose two signals."
+        assert page.locator("figure.panel").count() == count
+
+
+def test_the_difference_of_two_signals_is_drawn_for_every_run(tmp_path: Path) -> None:
+    with opened(overlaid_page(), tmp_path) as page:
+        assert subtract(page, "train.speed", "observer.speed") == ""
+        assert page.locator("figure.panel").first.locator(".entry").count() == 2
 
 
 def test_tables_are_sorted_filtered_chosen_and_lead_on(tmp_path: Path) -> None:

@@ -104,6 +104,28 @@ class LiveCurve {
   }
 }
 
+/** One curve of a recording minus another one of it. */
+class Difference extends LiveCurve {
+  constructor(first, second, ownAbscissa) {
+    const name = `${first.name} − ${second.name}`;
+    super(first.recording, first.run, {name, unit: first.unit, held: first.held && second.held, look: "", label: "", ascends: false, description: `Difference of ${first.name} and ${second.name}`});
+    Object.assign(this, {first, second, ownAbscissa, whole: first.whole && second.whole});
+  }
+
+  async load() { await (this.loading ||= this.subtract()); }
+
+  async subtract() {
+    for (const curve of [this.first, this.second]) {
+      await curve.load();
+      await curve.refine();
+    }
+    const {first, second} = this, own = await this.ownAbscissa();
+    const other = this.whole ? (_, row) => second.y[row] : (place) => second.at(second.over(own), place);
+    this.kept = first.kept;
+    this.y = Float64Array.from(first.over(own), (place, row) => first.y[row] - other(place, row));
+  }
+}
+
 /** What is drawn of curves between two places: every row, or of each piece the smallest and the largest value.
  *  parts: [{x, y}]. Returns [x, y1, y2, ...]; null is a gap, undefined no row there. */
 function drawn(parts, from, to, pieces) {

@@ -41,11 +41,13 @@ class Explorer {
   // -- what is drawn over -------------------------------------------------------------------------------------------
 
   /** Abscissa of a recording: its own, or a curve of it that ascends. */
-  async abscissa(recording) {
+  abscissa(recording) { return this.abscissaOf(recording, this.axis); }
+
+  async abscissaOf(recording, axis) {
     recording.abscissas ||= {};
-    return recording.abscissas[this.axis] ??= await (async () => {
-      if (this.axis === null) return separated(await decoded(recording.x));
-      const curve = recording.curves.find((c) => c.name === this.axis);
+    return recording.abscissas[axis] ??= await (async () => {
+      if (axis === null) return separated(await decoded(recording.x));
+      const curve = recording.curves.find((c) => c.name === axis);
       if (!curve?.ascends || !curve.whole) return null;
       await curve.load();
       await curve.refine();
@@ -184,6 +186,24 @@ class Explorer {
     this.listPanels();
   }
 
+  /** Draw one signal minus another one; what is wrong with that, in words, or nothing. */
+  async subtract(first, second) {
+    const unknown = [first, second].find((name) => !this.names.includes(name));
+    if (unknown !== undefined) return unknown ? `No signal is named ${unknown}.` : "Choose two signals.";
+    const pairs = this.curvesOf(first).flatMap((a) => this.curvesOf(second).filter((b) => b.recording === a.recording).map((b) => [a, b]));
+    if (!pairs.length) return `No run holds both ${first} and ${second}.`;
+    const odd = pairs.find(([a, b]) => a.unit !== b.unit);
+    if (odd) return `${first} is in ${odd[0].unit}, ${second} in ${odd[1].unit}: a difference needs two signals of one unit.`;
+    const found = pairs.map(([a, b]) => new Difference(a, b, () => this.abscissaOf(a.recording, null))), {name} = found[0];
+    if (!this.names.includes(name)) {
+      this.curves.push(...found);
+      this.names.push(name);
+    }
+    if (!this.charts.some((chart) => chart.panel.curves.includes(name))) await this.add({title: name, curves: [name]}, true);
+    this.charts.find((chart) => chart.panel.curves.includes(name)).node.scrollIntoView({block: "nearest"});
+    return "";
+  }
+
   // -- the frame ----------------------------------------------------------------------------------------------------
 
   frame() {
@@ -254,7 +274,7 @@ class Explorer {
     this.signals = element("div", {className: "signals"});
     const signals = element("details", {open: innerWidth >= 900}, element("summary", {textContent: "Signals"}), search,
       element("label", {className: "choice"}, "add to ", this.goal), this.signals);
-    const lists = element("aside", {className: "lists screen-only"}, signals);
+    const lists = element("aside", {className: "lists screen-only"}, signals, this.differences());
     if (this.data.marks.length) {
       this.markSearch = element("input", {type: "search", placeholder: `search ${this.data.marks.length} marks`, ariaLabel: "Search marks", oninput: () => this.listMarks()});
       this.markKinds = element("div", {className: "kinds"}, ...[...this.kinds].map(([kind]) => {
@@ -274,6 +294,23 @@ class Explorer {
     this.listSignals();
     this.listPanels();
     return lists;
+  }
+
+  /** The form that asks for the difference of two signals. */
+  differences() {
+    const names = element("datalist", {id: "signal-names"}, ...this.names.map((name) => element("option", {value: name, label: `[${this.curvesOf(name)[0].unit}]`})));
+    const [first, second] = ["first signal", "minus second signal"].map((text) => {
+      const field = element("input", {type: "search", placeholder: text, ariaLabel: text});
+      field.setAttribute("list", names.id);
+      return field;
+    });
+    const said = element("p", {className: "note", role: "status"});
+    const draw = async (event) => {
+      event.preventDefault();
+      said.textContent = await this.subtract(first.value.trim(), second.value.trim());
+    };
+    const form = element("form", {className: "difference", onsubmit: draw}, first, second, element("button", {textContent: "draw"}), said, names);
+    return element("details", {}, element("summary", {textContent: "Difference of two signals"}), form);
   }
 
   listPanels() {
