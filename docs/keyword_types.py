@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic import BaseModel, BeforeValidator
 
 from cosim.expectations.expectation import Expectation
+from cosim.expectations.registry import shipped_expectations
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.network_table import NetworkTable
 from cosim.scenario.paths import BALISE_PATHS, COMPONENT_PATHS, NETWORK_PATHS
@@ -52,7 +53,22 @@ def stub() -> str:
     classes: dict[str, str] = {}
     for table in TABLES:
         _write(table, classes)
-    return "\n".join([HEAD, *classes.values()])
+    return "\n".join([HEAD, *classes.values(), *_expectations()])
+
+
+def _expectations() -> list[str]:
+    """The names of the checks that ship, and a class with the keys of all of them."""
+    kinds = shipped_expectations()
+    types: dict[str, list[str]] = {}
+    for kind in dict.fromkeys(kinds.values()):
+        for name, info in kind.model_fields.items():
+            types.setdefault(name, []).extend(_type(info.annotation, name, {}).split(" | "))
+    del types["check"]
+    lines = [f"    {name}: {' | '.join(dict.fromkeys(found))}" for name, found in types.items()]
+    doc = '    """An expectation: the keys of all kinds together."""'
+    names = "".join(f'    "{name}",\n' for name in kinds)
+    keys = ["class ExpectationKeywords(TypedDict, total=False):", doc, "", *lines, ""]
+    return ["\n".join(keys), f"CheckName = Literal[\n{names}]\n"]
 
 
 def _write(table: type[BaseModel], classes: dict[str, str]) -> str:

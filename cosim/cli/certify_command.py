@@ -21,6 +21,7 @@ from cosim.scenario.shipped import shipped_scenarios
 from cosim.scenario.toml_file import read_toml
 from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
+from fmus.tables.table import Parts
 
 _NOT_CERTIFIED = 1
 _FEWEST = 4
@@ -79,7 +80,7 @@ def execute(options: argparse.Namespace) -> Output:
     observers = _observers(options, demands)
     unmet = [text for one in observers for text in one.unmet]
     data = {"observers": [one.to_dict() for one in observers], "not_certified": unmet}
-    parts = [findings_table(observers), "\n".join(f"not certified: {text}" for text in unmet)]
+    parts: Parts = [findings_table(observers), "\n".join(f"not certified: {text}" for text in unmet)]
     verdict = _verdict(len(unmet), sum(len(one.demanded) for one in observers))
     if unmet:
         return Output(parts, data, code=_NOT_CERTIFIED, verdict=verdict, role="bad")

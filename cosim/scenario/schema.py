@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 from functools import cache
 from math import ulp
 from pathlib import Path
@@ -184,7 +185,7 @@ def parse_scenario(data: dict[str, Any], where: str, folder: Path | None = None)
         raise ScenarioError(_in_words(error, where)) from error
 
 
-def parse_part(data: Mapping[str, Any], where: str, folder: Path | None = None, at: tuple[str, ...] = ()) -> Any:
+def parse_part(data: Mapping[str, Any], where: str, folder: Path | None = None, at: tuple[str | int, ...] = ()) -> Any:
     """Some keys of a scenario by themselves, validated by the same declarations as the whole.
 
     Args:
@@ -215,12 +216,14 @@ def _part(names: tuple[str, ...]) -> type[TomlTable]:
     return create_model("ScenarioPart", __base__=TomlTable, **fields)
 
 
-def _in_words(error: ValidationError, where: str, at: tuple[str, ...] = ()) -> str:
+def _in_words(error: ValidationError, where: str, at: tuple[str | int, ...] = ()) -> str:
     """What is wrong at a place of a scenario, or below it, a line each; empty where all of it lies elsewhere."""
     items: list[dict[str, Any]] = [dict(item) for item in error.errors() if item["loc"][: len(at)] == at]
     items = [item for item in items if not _of_another_form(item)]
     misplaced = {item["loc"][-1] for item in items if _is_misplaced(item)}
     shown = [item for item in items if (item["type"], item["loc"][-1:]) not in _missing(misplaced)]
+    misspelt = {near for item in shown if item["type"] == "extra_forbidden" for near in _near_keys(item["loc"])}
+    shown = [item for item in shown if item["type"] != "missing" or item["loc"] not in misspelt]
     return "\n".join(f"{where}: {_explain(item)}" for item in shown)
 
 
@@ -268,6 +271,11 @@ def _explain(item: dict[str, Any]) -> str:
     key = str(item["loc"][2]) if item["loc"][:1] == ("components",) and len(item["loc"]) > 2 else ""
     message = EXPECTED.get(key, message)
     return f"{place}: {message} (got {json.dumps(stated, default=str)})"
+
+
+def _near_keys(location: tuple[Any, ...]) -> list[tuple[Any, ...]]:
+    """Where the keys stand that an unknown one may be meant for."""
+    return [(*location[:-1], key) for key in get_close_matches(str(location[-1]), _known_keys(location))]
 
 
 def _hint(item: dict[str, Any]) -> str:

@@ -27,16 +27,18 @@ from cosim.toml_table import TomlTable
 from fmus.near_files import near_files
 
 F = TypeVar("F", bound=Callable[..., Any])
-COMPONENTS, CONNECTIONS, NETWORK = "components", "connections", "network"
+COMPONENTS, CONNECTIONS, NETWORK, EXPECT = "components", "connections", "network", "expect"
+_NAMING = ("signal", "reference", "bound")
+"""Keys of expectations that name a signal."""
 _ORIGINS = (*COMPONENT_PATHS, *MODEL_KEYS)
 
 
-def keywords_of(table: type[TomlTable], *left_out: str) -> Callable[[F], F]:
+def keywords_of(*tables: type[TomlTable], left_out: Sequence[str] = ()) -> Callable[[F], F]:
     """Give a method with ``**keywords``, or a class whose constructor has them, the signature that names them, for
     completion and help.
 
     Args:
-        table: whose keys the keywords are. left_out: keys that the method takes in another way.
+        tables: whose keys the keywords are. left_out: keys that the method takes in another way.
     """
 
     def named(method: F) -> F:
@@ -45,13 +47,22 @@ def keywords_of(table: type[TomlTable], *left_out: str) -> Callable[[F], F]:
             return method
         signature = inspect.signature(method)
         own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
-        keys = [p for name, p in table.__signature__.parameters.items() if name not in left_out]
-        method.__signature__ = signature.replace(parameters=[*own, *keys])  # type: ignore[attr-defined]
-        listed = ", ".join(f"``{p.name}``" for p in keys)
+        keys = {name: p for table in tables for name, p in _keys(table) if name not in left_out}
+        if len(tables) > 1:  # which keys are needed depends on the table that is meant
+            keys = {name: p.replace(default=None if p.default is p.empty else p.default) for name, p in keys.items()}
+        method.__signature__ = signature.replace(parameters=[*own, *keys.values()])  # type: ignore[attr-defined]
+        listed = ", ".join(f"``{name}``" for name in keys)
         method.__doc__ = f"{inspect.cleandoc(method.__doc__ or '')}\n\nKeywords: {listed}."
         return method
 
     return named
+
+
+def _keys(table: type[TomlTable]) -> Iterator[tuple[str, inspect.Parameter]]:
+    """The keys of a table by the names that a script gives them: what a file calls ``from`` is another word there."""
+    shown = table.__signature__.parameters
+    for name, field in table.model_fields.items():
+        yield name, (shown.get(name) or shown[str(field.alias)]).replace(name=name)
 
 
 class CallCheck:
@@ -116,16 +127,29 @@ class CallCheck:
         Raises:
             CosimError: something in it cannot be.
         """
-        part = self._parsed((name,), at)
+        try:
+            part = self._parsed((name,), at)
+        except ScenarioError as error:
+            if at or not _is_of_a_part(str(error), f"{self.where}: {name}"):
+                raise
+            together = f"the first call of {name}() states all that belongs together, later ones add to it"
+            raise ScenarioError(f"{error}; {together}") from error
         named = [] if part is None else list(_named_signals(part))
-        stated = [entry for entry in named if entry[0].split(".")[: len(at)] == list(at)]
-        known = self._known(signal.partition(".")[0] for _, signal, _ in stated)
-        for place, signal, unit in stated:
-            if "." not in signal:
-                raise ScenarioError(f"{self.where}: {place}: expected 'component.signal' (got {signal!r}).")
-            if signal.partition(".")[0] in known:
-                with self._named(place):
-                    check_signal(signal, unit, known, place)
+        for place, signal, unit in named:
+            if place.split(".")[: len(at)] == list(at):
+                self._signal(signal, unit, place)
+
+    def expectation(self) -> None:
+        """The last of the expectations, and the signals that it names.
+
+        Raises:
+            CosimError: something in it cannot be.
+        """
+        number = len(self.data[EXPECT])
+        expected = self._parsed((EXPECT,), (EXPECT, number - 1)).expect[-1]
+        named = [(key, name) for key in _NAMING if isinstance(name := getattr(expected, key, None), str)]
+        for key, name in named:
+            self._signal(name, None, f"expect, number {number}, {expected.check!r}, {key}")
 
     def setting(self, keys: tuple[str, ...]) -> None:
         """One value that was set; what does not fit it elsewhere may still be set too.
@@ -146,7 +170,16 @@ class CallCheck:
         elif key == "parameters" and part is not None:
             self._describe(name, part.components[name])
 
-    def _parsed(self, names: Sequence[str], at: tuple[str, ...]) -> Any:
+    def _signal(self, name: str, unit: str | None, place: str) -> None:
+        """A signal that a table names: it is there, and of the unit, where its component is there by now."""
+        if "." not in name:
+            raise ScenarioError(f"{self.where}: {place}: expected 'component.signal' (got {name!r}).")
+        known = self._known(iter([name.partition(".")[0]]))
+        if known:
+            with self._named(place):
+                check_signal(name, unit, known, place)
+
+    def _parsed(self, names: Sequence[str], at: tuple[str | int, ...]) -> Any:
         return parse_part({name: self.data[name] for name in names}, self.where, self.folder, at)
 
     def _component_table(self, name: str, table: Mapping[str, Any]) -> ComponentTable:
@@ -197,6 +230,13 @@ class CallCheck:
             if not text.startswith(self.where):
                 text = f"{self.where}: {text}" if place in text else f"{self.where}: {place}: {text}"
             raise type(error)(text) from error
+
+
+def _is_of_a_part(text: str, place: str) -> bool:
+    """Whether what is wrong is that a table is not whole: in one line, a key of it is missing, or it is refused as a
+    whole.
+    """
+    return "\n" not in text and (text.startswith(f"{place}: ") or text.endswith(": is missing"))
 
 
 def _named_signals(part: Any) -> Iterator[tuple[str, str, str | None]]:

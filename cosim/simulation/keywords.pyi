@@ -207,3 +207,44 @@ class ConnectionKeywords(TypedDict, total=False):
     offset: float
     units: Literal["convert", "ignore"]
     values: Sequence[tuple[float, float]]
+
+class ExpectationKeywords(TypedDict, total=False):
+    """An expectation: the keys of all kinds together."""
+
+    name: str | None
+    start: float | None
+    end: float | None
+    signal: str
+    reference: str
+    bound: str
+    of: str | Sequence[str] | None
+    max: float | None
+    rms: float | None
+    threshold: float | None
+    before: float
+    min: float | None
+    final: tuple[float, float] | None
+    missed: int | None
+    false: int | None
+    rejected: int | None
+    ignored: int | None
+    doubted: int | None
+    late: int | None
+    undelivered: int | None
+    used: int | None
+    at_most: int
+
+CheckName = Literal[
+    "bound",
+    "certificate",
+    "difference",
+    "speed_error",
+    "position_error",
+    "slip_error",
+    "adhesion_force_error",
+    "off",
+    "on",
+    "signal",
+    "telegrams",
+    "warnings",
+]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, Unpack
 
 from cosim.errors import CosimError, ScenarioError
+from cosim.expectations.registry import shipped_expectations
 from cosim.scenario.includes import Key, attribute
 from cosim.scenario.network_table import NetworkTable
 from cosim.scenario.override import (
@@ -87,7 +88,7 @@ class StatedScenario:
         components = {**self._data["components"], name: component_from_script(table)}
         return self._changed({"components": components}, lambda check: check.component(name))
 
-    @keywords_of(ConnectionTable, "source", "target")
+    @keywords_of(ConnectionTable, left_out=("source", "target"))
     def connect(self, *lines: str | Mapping[str, Any], **transformation: Unpack[keywords.ConnectionKeywords]) -> Self:
         """Add connections: ``"source.signal -> target.signal, target.signal"``.
 
@@ -138,19 +139,21 @@ class StatedScenario:
         """
         return self._with_table("report", table)
 
-    def expect(self, check: str, **table: Any) -> Self:
+    @keywords_of(*shipped_expectations().values(), left_out=("check",))
+    def expect(self, check: keywords.CheckName | str, **table: Unpack[keywords.ExpectationKeywords]) -> Self:
         """Add an expectation that the run is held against, see `cosim.expectations`.
 
         Args:
             check: what is checked: ``speed_error``, ``signal``, ``on``, ``telegrams``, ...
-            table: its keys as in a file; ``start`` and ``end`` may stand for ``from``, which Python keeps for itself,
-                and ``to``.
+            table: its keys as in a file, each of some kinds; ``start`` and ``end`` may stand for ``from``, which Python
+                keeps for itself, and ``to``.
 
         Raises:
-            ScenarioError: there is no such check, or it has no such key or value.
+            CosimError: there is no such check, or it has no such key or value; or a signal of a component that is there
+                does not exist.
         """
         items = [*self._data.get("expect", []), {"check": check, **plain(table)}]
-        return self._changed({"expect": items}, lambda check: check.table("expect"))
+        return self._changed({"expect": items}, lambda check: check.expectation())
 
     def set(self, name: str, value: Any) -> Self:
         """Override one value.

@@ -38,7 +38,7 @@ def warnings_in_lines(*, whole: bool) -> Iterator[None]:
             print("(--verbose shows warnings whole)", file=sys.stderr, flush=True)
 
 
-def _logged(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any) -> None:
+def _logged(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: Any, **__: Any) -> None:
     """A warning of Python, with its place at its end, as a line of the log."""
     logging.getLogger("py.warnings").warning("%s (%s, %s:%d)", message, category.__name__, filename, lineno)
 

@@ -184,7 +184,8 @@ def test_a_verdict_comes_last_in_one_line(
 ) -> None:
     """Of every command that ends with 1 where it is bad, as its help says."""
     words = LINES[case[0]][case[1]].split()
-    help_of = " ".join(PROGRAMS[case[0]].parser(words)._used(words).format_help().split())
+    parser: Any = PROGRAMS[case[0]].parser(words)
+    help_of = " ".join(parser._used(words).format_help().split())
     can_fail = re.search(r"Exit codes: 0 .*, 1 ", help_of)
     assert output.verdict or not can_fail
     assert output.code == 0 or (output.code == 1 and can_fail)

@@ -12,6 +12,7 @@ import pytest
 
 from cosim import Scenario, shipped_scenarios
 from cosim.errors import CosimError
+from cosim.expectations.registry import EXPECTATIONS
 from cosim.scenario.network_table import NetworkTable
 from cosim.scenario.scenario_tables import BalisesTable, ComponentTable, ConnectionTable, MasterTable, ReportTable
 from cosim.scenario.schema import ScenarioTable
@@ -87,6 +88,10 @@ MISTAKES: dict[str, tuple[Call, str]] = {
         lambda s: s.balises(layout="spacing", spacing=20.0, track_end=500.0),
         r"balises: layout 'spacing' needs 'position' and 'speed'",
     ),
+    "balises without layout": (
+        lambda s: s.balises(position="train.position", speed="train.speed"),
+        r"balises.layout: is missing; the first call of balises\(\) states all that belongs together",
+    ),
     "misspelt key of balises": (lambda s: s.balises(**BALISES, latncy=1.0), r"balises.latncy: .*'latency'"),
     "latency negative": (
         lambda s: s.balises(**BALISES, latency=-1.0),
@@ -112,6 +117,18 @@ MISTAKES: dict[str, tuple[Call, str]] = {
     "network without times": (lambda s: s.network(nodes={"front": ["train.speed"]}), r"network: give either 'period'"),
     "unknown component": (lambda s: s.set("trian.mass", 1.0), r"no component 'trian'; did you mean 'train'"),
     "unknown check": (lambda s: s.expect("sped_error", max=1.0), r"unknown check 'sped_error'.*'speed_error'"),
+    "misspelt key of a check that needs it": (
+        lambda s: s.expect("signal", sgnal="train.speed", max=1.0),
+        r"expect, number 1, 'signal', sgnal: unknown key; did you mean 'signal'",
+    ),
+    "misspelt signal of a check": (
+        lambda s: s.expect("signal", signal="train.sped", max=1.0),
+        r"expect, number 1, 'signal', signal: train: no variable 'sped'; did you mean 'speed'",
+    ),
+    "check of a component alone": (
+        lambda s: s.expect("difference", signal="train.speed", reference="train", max=1.0),
+        r"'difference', reference: expected 'component.signal' \(got 'train'\)",
+    ),
     "misspelt key of a check": (lambda s: s.expect("speed_error", maxx=1.0), r"maxx: unknown key.*'max'"),
 }
 
@@ -189,24 +206,26 @@ def test_a_connection_takes_what_happens_on_the_way_as_keywords() -> None:
 
 TARGETS = ("observer.odometer", "later.odometer")
 
-METHODS: dict[str, tuple[Any, set[str]]] = {
-    "__init__": (ScenarioTable, set()),
-    "add": (ComponentTable, set()),
-    "connect": (ConnectionTable, {"source", "target"}),
-    "balises": (BalisesTable, set()),
-    "network": (NetworkTable, set()),
-    "master": (MasterTable, set()),
-    "report": (ReportTable, set()),
+METHODS: dict[str, tuple[list[Any], set[str]]] = {
+    "__init__": ([ScenarioTable], set()),
+    "add": ([ComponentTable], set()),
+    "connect": ([ConnectionTable], {"source", "target"}),
+    "balises": ([BalisesTable], set()),
+    "network": ([NetworkTable], set()),
+    "master": ([MasterTable], set()),
+    "report": ([ReportTable], set()),
+    "expect": ([EXPECTATIONS[name] for name in EXPECTATIONS], {"check"}),
 }
+OWN = {"self", "name", "lines", "check", "folder", "where"}
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_signatures_and_help_name_the_keys_of_the_tables(method: str) -> None:
-    table, left_out = METHODS[method]
+    tables, left_out = METHODS[method]
     function = getattr(Scenario, method)
-    parameters = inspect.signature(function).parameters
-    assert set(table.model_fields) - left_out == {n for n in parameters if n in table.model_fields}
-    assert all(f"``{name}``" in str(inspect.getdoc(function)) for name in set(table.model_fields) - left_out)
+    keys = {key for table in tables for key in table.model_fields} - left_out
+    assert keys - OWN == set(inspect.signature(function).parameters) - OWN
+    assert all(f"``{key}``" in str(inspect.getdoc(function)) for key in keys)
 
 
 def test_the_types_for_completion_are_those_of_the_tables() -> None:
