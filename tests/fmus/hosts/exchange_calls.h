@@ -1,6 +1,6 @@
-/* What a model exchange instance of FMI 2.0 and of FMI 3.0 does with the same words; included where OWN is its own type, `M`
-   the instance as one, FMI the prefix of its functions and FUNCTIONS the file that lists them, STATE(before, after) names a
-   function for a state, FMI_STATE(, ) the type of one and FMI_BYTE that of its bytes. */
+/* What a model exchange instance of FMI 2.0 and of FMI 3.0 does with the same words, those of ``words_fmi2.h`` or
+   ``words_fmi3.h``; included where OWN is its own type, `M` the instance as one, and FUNCTIONS the file that lists the functions
+   that are called. */
 #ifndef EXCHANGE_CALLS_H
 #define EXCHANGE_CALLS_H
 

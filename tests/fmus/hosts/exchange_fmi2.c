@@ -59,12 +59,8 @@ static int do_step(Model *model, double t, double h) {
 }
 
 #define OWN Model2
-#define FMI "fmi2"
 #define FUNCTIONS "exchange_functions_fmi2.h"
-#define STATE(before, after) before##FMUstate##after
-#define FMI_STATE(before, after) fmi2##before##FMUstate##after
-#define DESERIALIZE DeSerializeFMUstate
-#define FMI_BYTE char
+#include "words_fmi2.h"
 #include "exchange_calls.h"
 
 Model *open_model2(const char *name, const char *library, const char *token, const char *resources) {

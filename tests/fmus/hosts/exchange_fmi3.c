@@ -61,12 +61,8 @@ static int do_step(Model *model, double t, double h) {
 }
 
 #define OWN Model3
-#define FMI "fmi3"
 #define FUNCTIONS "exchange_functions_fmi3.h"
-#define STATE(before, after) before##FMUState##after
-#define FMI_STATE(before, after) fmi3##before##FMUState##after
-#define DESERIALIZE DeserializeFMUState
-#define FMI_BYTE fmi3Byte
+#include "words_fmi3.h"
 #include "exchange_calls.h"
 
 Model *open_model3(const char *name, const char *library, const char *token, const char *resources) {

@@ -1,7 +1,5 @@
-/* What a slave of FMI 2.0 and one of FMI 3.0 do with the same words; included where OWN is its own type, FMI the prefix of
-   its functions and FUNCTIONS the file that lists them, REAL and INTEGER are FMI's words for both types of number and
-   ONE(value) is how one value is handed over, STATE(before, after) names a function for a state, FMI_STATE(, ) the type of
-   one and FMI_BYTE that of its bytes. */
+/* What a slave of FMI 2.0 and one of FMI 3.0 do with the same words, those of ``words_fmi2.h`` or ``words_fmi3.h``; included
+   where OWN is its own type and FUNCTIONS the file that lists the functions that are called. */
 #ifndef SLAVE_CALLS_H
 #define SLAVE_CALLS_H
 
@@ -11,25 +9,18 @@
 #define JOINED(verb, type) JOINED_NAMES(verb, type)
 #define JOINED_NAMES(verb, type) verb##type
 
-static double get_real(Slave *slave, unsigned reference) {
-    double value;
-    REQUIRE(JOINED(Get, REAL), (S->c, &reference, 1, ONE(&value)));
-    return value;
-}
+#define ACCESS(name, type, NAME)                                                   \
+    static type get_##name(Slave *slave, unsigned reference) {                     \
+        type value;                                                                \
+        REQUIRE(JOINED(Get, NAME), (S->c, &reference, 1, ONE(&value)));            \
+        return value;                                                              \
+    }                                                                              \
+    static void set_##name(Slave *slave, unsigned reference, type value) {         \
+        REQUIRE(JOINED(Set, NAME), (S->c, &reference, 1, ONE(&value)));            \
+    }
 
-static void set_real(Slave *slave, unsigned reference, double value) {
-    REQUIRE(JOINED(Set, REAL), (S->c, &reference, 1, ONE(&value)));
-}
-
-static int get_integer(Slave *slave, unsigned reference) {
-    int value;
-    REQUIRE(JOINED(Get, INTEGER), (S->c, &reference, 1, ONE(&value)));
-    return value;
-}
-
-static void set_integer(Slave *slave, unsigned reference, int value) {
-    REQUIRE(JOINED(Set, INTEGER), (S->c, &reference, 1, ONE(&value)));
-}
+ACCESS(real, double, REAL)
+ACCESS(integer, int, INTEGER)
 
 static void *save(Slave *slave) {
     FMI_STATE(, ) state = NULL;

@@ -46,15 +46,8 @@ static void notify(Slave *slave, unsigned clock, size_t count, const unsigned *r
 }
 
 #define OWN Slave2
-#define FMI "fmi2"
 #define FUNCTIONS "functions_fmi2.h"
-#define REAL Real
-#define INTEGER Integer
-#define ONE(value) value
-#define STATE(before, after) before##FMUstate##after
-#define FMI_STATE(before, after) fmi2##before##FMUstate##after
-#define DESERIALIZE DeSerializeFMUstate
-#define FMI_BYTE char
+#include "words_fmi2.h"
 #include "slave_calls.h"
 
 Slave *open_fmi2(const char *name, const char *library, const char *token, const char *resources) {

@@ -59,15 +59,8 @@ static void notify(Slave *slave, unsigned clock, size_t count, const unsigned *r
 }
 
 #define OWN Slave3
-#define FMI "fmi3"
 #define FUNCTIONS "functions_fmi3.h"
-#define REAL Float64
-#define INTEGER Int32
-#define ONE(value) value, 1
-#define STATE(before, after) before##FMUState##after
-#define FMI_STATE(before, after) fmi3##before##FMUState##after
-#define DESERIALIZE DeserializeFMUState
-#define FMI_BYTE fmi3Byte
+#include "words_fmi3.h"
 #include "slave_calls.h"
 
 Slave *open_fmi3(const char *name, const char *library, const char *token, const char *resources, bool event_mode) {
