@@ -27,7 +27,6 @@ static void model_start(Model *m) { m->u = 1.0; }
 BEGINS_AT_ITS_TIME
 
 VARIABLES(
-    VARIABLE(TIME, F64, OUTPUT, time)
     VARIABLE(U, F64, INPUT, u)
     VARIABLE(Y, F64, OUTPUT, y))
 

@@ -24,7 +24,6 @@ static void model_start(Model *m) {
 BEGINS_AT_ITS_TIME
 
 VARIABLES(
-    VARIABLE(TIME, F64, OUTPUT, time)
     VARIABLE(U, F64, INPUT, u)
     VARIABLE(Y, F64, OUTPUT, y)
     VARIABLE(CHANGES, I32, OUTPUT, changes)
@@ -36,12 +35,7 @@ NOTHING_TO_REFRESH
 
 static bool to_be_kicked(const Model *m) { return m->kick_time >= 0.0 && !m->kicked; }
 
-static Outcome model_step(Model *m, Host *host, double t, double until) {
-    (void)t;
-    const Outcome outcome = arrived_at_event(host, to_be_kicked(m), m->kick_time, until);
-    m->time = outcome.reached;
-    return outcome;
-}
+STEPS_TO_ITS_EVENT(to_be_kicked, kick_time)
 
 static void respond(Model *m, double y) {
     m->changes += y != m->y;

@@ -28,7 +28,6 @@ static void model_start(Model *m) {
 BEGINS_AT_ITS_TIME
 
 VARIABLES(
-    VARIABLE(TIME, F64, OUTPUT, time)
     VARIABLE(START, CLOCK, INPUT_CLOCK, start)
     VARIABLE(ALARM, CLOCK, INPUT_CLOCK, alarm)
     VARIABLE(DELAY, F64, PARAMETER, delay)
@@ -42,12 +41,7 @@ NOTHING_TO_REFRESH
 
 static bool to_be_armed(const Model *m) { return m->arm_time >= 0.0 && !m->was_armed; }
 
-static Outcome model_step(Model *m, Host *host, double t, double until) {
-    (void)t;
-    const Outcome outcome = arrived_at_event(host, to_be_armed(m), m->arm_time, until);
-    m->time = outcome.reached;
-    return outcome;
-}
+STEPS_TO_ITS_EVENT(to_be_armed, arm_time)
 
 static void arm(Model *m, double t) {
     m->interval = m->delay;

@@ -23,7 +23,6 @@ static void model_start(Model *m) { m->at = 0.25; }
 BEGINS_AT_ITS_TIME
 
 VARIABLES(
-    VARIABLE(TIME, F64, OUTPUT, time)
     VARIABLE(DEED, F64, PARAMETER, deed)
     VARIABLE(AT_TIME, F64, PARAMETER, at)
     VARIABLE(Y, F64, OUTPUT, y))

@@ -18,7 +18,6 @@ static void model_begin(Model *m, double t0) {
 }
 
 VARIABLES(
-    VARIABLE(TIME, F64, OUTPUT, time)
     VARIABLE(U, F64, INPUT, u)
     VARIABLE(INTEGRAL, F64, OUTPUT, integral)
     VARIABLE(CHANGES, I32, OUTPUT, changes)

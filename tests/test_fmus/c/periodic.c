@@ -20,7 +20,6 @@ static void model_start(Model *m) { m->last_when = -1.0; }
 static void model_begin(Model *m, double t0) { m->time = m->start = t0; }
 
 VARIABLES(
-    VARIABLE(TIME, F64, OUTPUT, time)
     VARIABLE(TICK, CLOCK, INPUT_CLOCK, tick)
     VARIABLE(U, F64, INPUT, u)
     VARIABLE(COUNT, I32, OUTPUT, count)

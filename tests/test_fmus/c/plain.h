@@ -10,10 +10,11 @@ typedef struct {
 
 #define SAME 1e-12 /* closer in time than this is the same instant [s] */
 
-/* The variables, `reference` by reference, and where in the model their values stand. */
+/* The variables behind the time, `reference` by reference, and where in the model their values stand. */
 #define VARIABLES(...)                                            \
     static Slot model_slot(Model *m, unsigned reference) {        \
         switch (reference) {                                      \
+            VARIABLE(TIME, F64, OUTPUT, time)                     \
             __VA_ARGS__                                           \
             default: return (Slot){0};                            \
         }                                                         \
@@ -38,5 +39,14 @@ static inline Outcome arrived_at_event(const Host *host, bool due, double next, 
     }
     return outcome;
 }
+
+/* A step to its end or to the model's own event, which is due at a time as long as `due` says so. */
+#define STEPS_TO_ITS_EVENT(due, at)                                                       \
+    static Outcome model_step(Model *m, Host *host, double t, double until) {             \
+        (void)t;                                                                          \
+        const Outcome outcome = arrived_at_event(host, due(m), m->at, until);             \
+        m->time = outcome.reached;                                                        \
+        return outcome;                                                                   \
+    }
 
 #endif

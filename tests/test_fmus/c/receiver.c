@@ -18,7 +18,6 @@ static void model_start(Model *m) { m->when = -1.0; }
 BEGINS_AT_ITS_TIME
 
 VARIABLES(
-    VARIABLE(TIME, F64, OUTPUT, time)
     VARIABLE(TICK, CLOCK, INPUT_CLOCK, tick)
     case VALUE:
         return (Slot){.kind = F64, .role = HAS_EVENT_MODE ? CLOCKED_INPUT : INPUT, .at = &m->value, .size = 1, .clock = &m->tick};

@@ -18,7 +18,6 @@ static void model_start(Model *m) { m->level = FIRST_LEVEL; }
 BEGINS_AT_ITS_TIME
 
 VARIABLES(
-    VARIABLE(TIME, F64, OUTPUT, time)
     VARIABLE(LEVEL, F64, OUTPUT, level)
     VARIABLE(COUNT, I32, OUTPUT, jumps))
 

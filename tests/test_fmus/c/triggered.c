@@ -28,7 +28,6 @@ static void model_begin(Model *m, double t0) {
 }
 
 VARIABLES(
-    VARIABLE(TIME, F64, OUTPUT, time)
     VARIABLE(RATE, F64, PARAMETER, rate)
     VARIABLE(LEVEL, F64, PARAMETER, level)
     VARIABLE(CROSSING, CLOCK, OUTPUT_CLOCK, crossing)
