@@ -11,6 +11,8 @@
 /* The step under way. */
 typedef struct {
     Program *program;
+    double *outputs; /* of the plant */
+    size_t size;     /* theirs, in bytes */
     double t, until;
     double p0, v0, p1, v1; /* position and speed of the plant at both ends */
     bool found, read;      /* a balise is passed; the odometer was read */
@@ -193,7 +195,7 @@ static bool find_stamp(Over *over, void *state) {
 static bool saved_plant(Over *over, void **state) {
     Program *program = over->program;
     const PlantMonitor *watch = &program->watch;
-    memcpy(program->balises.start, program->values + watch->first_output, (size_t)watch->output_count * sizeof(double));
+    memcpy(program->balises.start, over->outputs, over->size);
     program->status = ((SaveState)program->balises.save_state)(program->slaves[watch->slave].instance, state);
     note(program, watch->slave, CALL_SAVE, 0)->state = *state;
     return program->status <= STATUS_WARNING;
@@ -203,46 +205,40 @@ static bool saved_plant(Over *over, void **state) {
 static bool play_plant(Over *over) {
     Program *program = over->program;
     Balises *balises = &program->balises;
-    const PlantMonitor *watch = &program->watch;
-    double *outputs = program->values + watch->first_output;
-    size_t size = (size_t)watch->output_count * sizeof(double);
     void *state = NULL;
     over->found = true;
     over->which = balises->next_instant;
     over->stamp = balises->instants[over->which];
-    if (!saved_plant(over, &state) || !drive(program, watch->slave, over->t, over->stamp))
+    if (!saved_plant(over, &state) || !drive(program, program->watch.slave, over->t, over->stamp))
         return false;
-    memcpy(balises->there, outputs, size);
+    memcpy(balises->there, over->outputs, over->size);
     if (!state_call(over, CALL_RESTORE, balises->restore_state, state))
         return false;
-    program->slaves[watch->slave].now = over->t;
-    memcpy(outputs, balises->start, size);
-    return drive(program, watch->slave, over->t, over->until);
+    program->slaves[program->watch.slave].now = over->t;
+    memcpy(over->outputs, balises->start, over->size);
+    return drive(program, program->watch.slave, over->t, over->until);
 }
 
 static bool move_plant(Over *over) {
     Program *program = over->program;
     Balises *balises = &program->balises;
-    const PlantMonitor *watch = &program->watch;
-    double *outputs = program->values + watch->first_output;
-    size_t size = (size_t)watch->output_count * sizeof(double);
     void *state = NULL;
     over->p0 = position_of(program, program->values);
     over->v0 = speed_of(program, program->values);
-    if (!saved_plant(over, &state) || !drive(program, watch->slave, over->t, over->until))
+    if (!saved_plant(over, &state) || !drive(program, program->watch.slave, over->t, over->until))
         return false;
     over->p1 = position_of(program, program->values);
     over->v1 = speed_of(program, program->values);
-    memcpy(balises->final, outputs, size);
+    memcpy(balises->final, over->outputs, over->size);
     if (!find_stamp(over, state))
         return false;
     if (over->found) {
         if (!go(over, state, over->stamp))
             return false;
-        memcpy(balises->there, outputs, size);
+        memcpy(balises->there, over->outputs, over->size);
         over->position = position_of(program, program->values);
         over->speed = speed_of(program, program->values);
-        if (!go(over, state, over->until) || memcmp(outputs, balises->final, size) != 0)
+        if (!go(over, state, over->until) || memcmp(over->outputs, balises->final, over->size) != 0)
             return false;
     }
     return state_call(over, CALL_RELEASE, balises->release_state, &state);
@@ -400,7 +396,13 @@ static int64_t step_over(Program *program, double t, double until, double *rows,
     stopped(program, STOP_NEAR, 0, 0);
     if (!balises->on || room < ROWS_AT_MOST || balises->passed_count >= balises->passed_limit || !is_single(balises, until))
         return -1;
-    Over over = {.program = program, .t = t, .until = until};
+    Over over = {
+        .program = program,
+        .outputs = program->values + program->watch.first_output,
+        .size = (size_t)program->watch.output_count * sizeof(double),
+        .t = t,
+        .until = until,
+    };
     for (int64_t i = 0; i < program->slave_count; i++) {
         program->slaves[i].calls_here = program->slaves[i].returns_here = 0;
         program->slaves[i].now = t;
