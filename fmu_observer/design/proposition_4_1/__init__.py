@@ -6,8 +6,6 @@ from fmu_observer.design.proposition_4_1.proposition_design import (
     InfeasibleBounds,
     Proposition41Design,
     design_proposition_4_1,
-    largest_decay,
-    smallest_alpha,
 )
 from fmu_observer.design.proposition_4_1.proposition_inequalities import Proposition41Problem, train_vertices
 from fmu_observer.design.proposition_4_1.sharpest import BoundMatrix, bound_matrix
@@ -19,7 +17,5 @@ __all__ = [
     "Proposition41Problem",
     "bound_matrix",
     "design_proposition_4_1",
-    "largest_decay",
-    "smallest_alpha",
     "train_vertices",
 ]

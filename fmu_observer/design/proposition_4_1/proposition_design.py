@@ -99,34 +99,6 @@ def design_proposition_4_1(
     return _designed(problem, *found)
 
 
-def smallest_alpha(A: Any, C: Any, m: float, *, gains: Any = None) -> float | None:
-    """Least alpha of (4.42) at a decay, with ``P >= I``; None where no gain, or not the gains given, reach the decay.
-
-    Args:
-        A: shape (n, n) or (N, n, n) [1/s]. C: shape (n,). m: decay rate [1/s]. gains: as in `design_proposition_4_1`.
-
-    Raises:
-        ValueError: an argument is not legal.
-        ImportError: cvxpy is not installed.
-    """
-    problem = Proposition41Problem.of(A, C, m, None)
-    return _smallest_alphas(problem, None if gains is None else _checked_gains(problem, gains))(problem.m)
-
-
-def largest_decay(A: Any, C: Any, most: float, alpha: float | None = None, *, gains: Any = None) -> float | None:
-    """Largest decay m up to `most` [1/s] that is feasible, by bisection; None if none is down to a thousandth of it.
-
-    Args:
-        A: shape (n, n) or (N, n, n) [1/s]. C: shape (n,). most: [1/s]. alpha, gains: as in `design_proposition_4_1`.
-
-    Raises:
-        ValueError: an argument is not legal.
-        ImportError: cvxpy is not installed.
-    """
-    problem = Proposition41Problem.of(A, C, most, alpha)
-    return _largest_decay(problem, None if gains is None else _checked_gains(problem, gains))
-
-
 def _designed(
     problem: Proposition41Problem, candidate: Proposition41Candidate, proof: dict[str, float]
 ) -> Proposition41Design:
