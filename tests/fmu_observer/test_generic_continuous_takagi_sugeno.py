@@ -1,4 +1,4 @@
-"""The Takagi-Sugeno Luenberger observer: its error equation, its inequalities, its design."""
+"""The Takagi-Sugeno Luenberger observer: its error equation and its inequalities."""
 
 from dataclasses import replace
 
@@ -7,11 +7,10 @@ import pytest
 from own_condition import own_condition
 from scipy.integrate import solve_ivp
 
-from fmu_observer.models.known_models import TAKAGI_SUGENO_MODELS, find_takagi_sugeno_model
+from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.observability import UnobservableError
 from fmu_observer.observers.generic.continuous import TakagiSugenoLuenberger
 from fmu_observer.observers.generic.continuous.takagi_sugeno_luenberger import (
-    _designed_gains,
     _placed_gains,
     _vertex_decrease,
     vertex_errors,
@@ -62,25 +61,12 @@ def test_estimated_premises_are_another_observer_that_converges_too() -> None:
     assert condition.numbers["premises_not_measured"] == 1
 
 
-@pytest.mark.parametrize("name", sorted(TAKAGI_SUGENO_MODELS))
-def test_designed_gains_satisfy_the_inequalities_at_the_asked_decay(name: str) -> None:
-    model = find_takagi_sugeno_model(name)
-    gains = _designed_gains(model, decay=0.5)
-    assert max(np.linalg.eigvals(error).real.max() for error in vertex_errors(model, gains)) < -0.5
-    found = _vertex_decrease(model, gains)
-    assert found.margin > 0.0
-    observer = TakagiSugenoLuenberger(model, gains=gains)
-    assert own_condition(observer).holds
-    assert observer.start_parameters()[:-1] == pytest.approx(gains.ravel())
-
-
-def test_equal_poles_at_the_vertices_are_not_enough_and_the_inequalities_are() -> None:
+def test_equal_poles_at_the_vertices_are_not_enough() -> None:
     """The first example of chapter 2: every vertex has its poles at -2 and beyond, and no common P exists."""
     model = find_takagi_sugeno_model("triangularisable_example")
     placed = own_condition(TakagiSugenoLuenberger(model))
     assert placed.numbers["abscissa"] == pytest.approx(-2.0, abs=1e-6)
     assert not placed.holds
-    assert own_condition(TakagiSugenoLuenberger(model, gains=_designed_gains(model))).holds
 
 
 def test_the_printed_order_of_the_product_is_no_inequality() -> None:
@@ -101,23 +87,6 @@ def test_bad_input() -> None:
     blind = replace(model, A=np.stack([np.array([[0.0, 0.0], [s, -0.2]]) for s in (-1.0, 0.2)]))
     with pytest.raises(UnobservableError, match=r"vertex 1: .*rate"):
         TakagiSugenoLuenberger(blind)
-    stuck = replace(model, A=np.stack([np.array([[0.0, 0.0], [s, 0.2]]) for s in (-1.0, 0.2)]))
-    with pytest.raises(UnobservableError, match=r"design of pendulum, vertex 1: .*eigenvalue 0.2 1/s .*rate"):
-        _designed_gains(stuck)
-
-
-def test_an_infeasible_decay_is_refused_with_the_nearest_one() -> None:
-    """The rate is not measured and decays with 0.2 1/s by itself: no gain makes it faster, every smaller decay can be
-    had.
-    """
-    blind = replace(
-        find_takagi_sugeno_model("pendulum"), A=np.stack([np.array([[0.0, 0.0], [s, -0.2]]) for s in (-1.0, 0.2)])
-    )
-    with pytest.raises(ValueError, match=r"no common P at the 2 vertices for decay 1 1/s. Nearest decay") as refused:
-        _designed_gains(blind, 1.0)
-    nearest = float(str(refused.value).split("found feasible: ")[1].split()[0])
-    assert 0.19 < nearest <= 0.2  # ten bisections of nine decades leave 2 %
-    assert _designed_gains(blind, 0.99 * nearest).shape == (2, 2, 1)
 
 
 def test_time_outside_the_bounds_is_counted() -> None:

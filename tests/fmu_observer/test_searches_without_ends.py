@@ -31,7 +31,6 @@ from fmu_observer.design.theorem7 import theorem7_design as theorem7
 from fmu_observer.models.known_models import MODELS, find_model, find_takagi_sugeno_model
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.models.scaled_slopes import best_scale
-from fmu_observer.observers.generic.continuous import takagi_sugeno_luenberger
 
 TRAIN = find_takagi_sugeno_model("takagi_sugeno_train")
 UNITS = [1e-6, 1e-3, 1.0, 1e3, 1e6]
@@ -129,7 +128,6 @@ def test_where_no_theta_is_enough_none_is_found(share: float, exists: bool) -> N
 @pytest.mark.parametrize(
     ("module", "proof", "response", "ask"),
     [
-        (takagi_sugeno_luenberger, "_proven", None, lambda: takagi_sugeno_luenberger._designed_gains(TRAIN, 8.0)),
         (theorem7, "_proven", None, lambda: theorem7.design_theorem7(TRAIN, 2.0, 8.0)),
         (proposition_4_1, "margins", {"": -1.0}, lambda: proposition_4_1.design_proposition_4_1(A, B[0], 8.0)),
         (robust_residual, "candidates", (), lambda: robust_residual.design_robust_residual(chapter_5(8.0))),
@@ -139,5 +137,5 @@ def test_a_design_that_finds_nothing_says_down_to_what(
     module: Any, proof: str, response: Any, ask: Callable[[], Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, proof, lambda *_, **__: response)
-    with pytest.raises(ValueError, match=r"down to (8e-09|0\.008) 1/s"):
+    with pytest.raises(ValueError, match=r"down to 0\.008 1/s"):
         ask()
