@@ -1,8 +1,4 @@
-"""Model matrices and gain design of the discrete unknown-input observer. Plain NumPy and SciPy, no hybrid system.
-
-The observer itself needs none of this at run time: its gains are parameters, and these functions say where their start
-values come from and give new ones for other sampling periods.
-"""
+"""Model matrices of the discrete unknown-input observer and their discretisation. Plain NumPy and SciPy."""
 
 from __future__ import annotations
 
@@ -42,20 +38,3 @@ def discretise(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray,
     block[:n, :n], block[:n, n] = A, B
     exponential = scipy.linalg.expm(block * period)
     return exponential[:n, :n], exponential[:n, n]
-
-
-def process_covariance(A: np.ndarray, density: np.ndarray, period: float) -> np.ndarray:
-    """Covariance that white noise leaves in ``dx = A x + w`` over one period (Van Loan, IEEE TAC 23 (1978) 395).
-
-    Args:
-        A: shape (n, n). density: spectral density of w, shape (n, n) [x2/s]. period: [s].
-
-    Returns:
-        ``integral of exp(A s) density exp(A' s) from 0 to period``, shape (n, n), symmetric.
-    """
-    n = len(A)
-    block = np.zeros((2 * n, 2 * n))
-    block[:n, :n], block[:n, n:], block[n:, n:] = -A, density, A.T
-    exponential = scipy.linalg.expm(block * period)
-    covariance = exponential[n:, n:].T @ exponential[:n, n:]
-    return np.asarray(0.5 * (covariance + covariance.T))

@@ -23,10 +23,7 @@ from fmu_observer.design.residual_analysis import h_infinity_norm
 from fmu_observer.design.residual_channel import residual_channel
 from fmu_observer.design.robust_residual import ResidualProblem, design_robust_residual
 from fmu_observer.design.theorem7 import design_theorem7, largest_eta
-from fmu_observer.models.known_models import find_takagi_sugeno_model
 from fmu_observer.models.train.coupled_vehicles_model import coupled_vehicles
-from fmu_observer.observers.generic.continuous.takagi_sugeno_luenberger import _designed_gains
-from fmu_observer.observers.train.discrete_uio import _uio_gains, _UioCovariances
 from fmu_observer.observers.train.gains.gap_aware import design_adaptive, design_high_gain, design_takagi_sugeno
 
 REPETITIONS = 5
@@ -38,8 +35,6 @@ RESIDUAL = residual_channel(SECTION_5_3_1.vertices[0], SECTION_5_3_1.gains[0], S
 REPEATED: dict[str, Callable[[], Any]] = {
     "pole placement, 4 states": lambda: observer_gain(CHAIN, FIRST, [-1.0, -2.0, -3.0, -4.0]),
     "augmented observer, 4 poles": lambda: position_gains([-1.0, -1.5, -2.0, -2.5]),
-    "unknown-input observer, two Riccati equations": lambda: _uio_gains(_UioCovariances(), 1e-3),
-    "Takagi-Sugeno Luenberger (1.26), train": lambda: _designed_gains(find_takagi_sugeno_model("takagi_sugeno_train")),
     "Theorem 7, train (0.1 s, 3 1/s)": lambda: design_theorem7("takagi_sugeno_train", 0.1, 3.0),
     "Theorem 7, E1 core (0.2 s, 1 1/s)": lambda: design_theorem7(
         "triangularisable_example", 0.2, 1.0, performance=False

@@ -23,8 +23,6 @@ class Together(HybridSystem):
     """Plant and observer side by side; the noise v of the continuous output is an input, held between two settings."""
 
     name = "together"
-    description = "An academic plant and its observer"
-    source = "tests"
     inputs = (input_signal("noise", "1"),)
     internal_step = STEP
 

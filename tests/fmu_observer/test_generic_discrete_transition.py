@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad_vec, solve_ivp
 from scipy.linalg import expm
 from scipy.signal import cont2discrete
+from uio_gains import process_covariance
 
-from fmu_observer.design.uio_design import process_covariance
 from fmu_observer.models.discrete_model import _zero_order_hold, transition
 from fmu_observer.models.exhibits.pendulum_model import linear_pendulum, pendulum
 from fmu_observer.models.train.freight_train_model import freight_train

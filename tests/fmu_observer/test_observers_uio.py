@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from observer_runner import DAVIS_B, DAVIS_C, MASS, SystemRunner
 from scipy.linalg import expm
+from uio_gains import UioCovariances, uio_gains
 
 from fmu_observer.design.uio_design import discretise, uio_matrices
 from fmu_observer.observers.train import DiscreteUio
-from fmu_observer.observers.train.discrete_uio import _uio_gains, _UioCovariances
 
 SLOPE = (DAVIS_B + DAVIS_C * 50.0 / 3.6) / MASS
 PRINTED_AD = np.array(
@@ -59,7 +59,7 @@ def test_the_observer_between_samples_is_the_discrete_model() -> None:
 
 
 def test_declared_gains_are_those_of_the_design() -> None:
-    designed = _uio_gains(_UioCovariances(), SLOPE)
+    designed = uio_gains(UioCovariances(), SLOPE)
     declared = {s.name: np.array(s.start) for s in DiscreteUio().parameters}
     np.testing.assert_allclose(declared["odometer_gain"], designed[0], atol=5e-6)  # rounded to five digits
     np.testing.assert_allclose(declared["balise_gain"], designed[1], atol=5e-6)
@@ -67,7 +67,7 @@ def test_declared_gains_are_those_of_the_design() -> None:
 
 def test_the_design_is_the_stationary_kalman_filter() -> None:
     """Iterating the covariance of the balise channel from afar ends at the gain."""
-    covariances = _UioCovariances(balise_gap=0.7, slip_noise=0.3)
+    covariances = UioCovariances(balise_gap=0.7, slip_noise=0.3)
     shift, gap = np.diag([1.0, 1.0], 1), 0.7
     F = expm(shift * gap)
     g = np.array([gap**5 / 20, gap**4 / 8, gap**3 / 6, gap**4 / 8, gap**3 / 3, gap**2 / 2, gap**3 / 6, gap**2 / 2, gap])
@@ -77,7 +77,7 @@ def test_the_design_is_the_stationary_kalman_filter() -> None:
         P = F @ P @ F.T + Q
         K = P[:, 0] / (P[0, 0] + covariances.balise_noise)
         P = P - np.outer(K, P[0])
-    np.testing.assert_allclose(_uio_gains(covariances, SLOPE)[1][[0, 2, 4]], K, rtol=1e-8)
+    np.testing.assert_allclose(uio_gains(covariances, SLOPE)[1][[0, 2, 4]], K, rtol=1e-8)
 
 
 def test_a_balise_acts_at_its_own_stamp() -> None:

@@ -31,8 +31,6 @@ class Fast(HybridSystem):
     """A linear plant that forgets within 20 ms."""
 
     name = "fast"
-    description = "dx/dt = -50 x + u"
-    source = "test"
     internal_step = 1e-3
     states = (state("x", "1", 1.0, "State"),)
     inputs = (input_signal("u", "1"),)

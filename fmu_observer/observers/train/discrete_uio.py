@@ -2,45 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy
 
 from fmu_observer.certificates.finding import Finding
 from fmu_observer.certificates.sample_products import TwoRateError, certify_two_rate_error
-from fmu_observer.design.uio_design import process_covariance, uio_matrices
+from fmu_observer.design.uio_design import uio_matrices
 from fmu_observer.detection.jam_detector import ODOMETER_SAMPLE
 from fmu_observer.models.observer_model import named_as, stacked_of
 from fmu_observer.observers.train.train_observer import Estimate, TrainObserver
 from fmu_observer.observers.train.train_signals import LAST_INNOVATION, POSITION
 from plant_models.hybrid import Array, parameter, state
 
-
-@dataclass(frozen=True)
-class _UioCovariances:
-    """What the gains are designed for [ours: the thesis prints no gains and no covariances].
-
-    Attributes:
-        slip_noise: spectral density of the white second derivative of the slip speed d1 [m2/s5].
-        disturbance_noise: spectral density of the white second derivative of the acceleration disturbance d2 [m2/s7].
-        odometer_noise: variance of an odometer reading [m2/s2].
-        balise_noise: variance of a balise position [m2].
-        odometer_period: sampling period of the odometer [s].
-        balise_gap: gap between balises the balise gains are designed for [s].
-    """
-
-    slip_noise: float = 0.1
-    disturbance_noise: float = 0.1
-    odometer_noise: float = 0.05**2
-    balise_noise: float = 0.1**2
-    odometer_period: float = 0.1
-    balise_gap: float = 1.0
-
-
-# Start values: uio_gains(UioCovariances(), drag slope of the default train), rounded to five digits; a test recomputes
-# them.
+# Steady-state Kalman gains for the drag slope of the default train, rounded to five digits; a test recomputes them.
 _ODOMETER_GAIN = (0.0, 0.41889, 0.0, 1.13024, 0.0, 1.52461)
 _BALISE_GAIN = (0.94689, 0.0, 1.17481, 0.0, 0.7288, 0.0)
 ORDER = 6
@@ -56,8 +31,8 @@ class DiscreteUio(TrainObserver):
 
     The model flows continuously between samples, which equals the printed A_d, B_d at each of them, so that a balise
     acts at its own stamp. The printed matrix has the slip disturbance in the wrong column (see `uio_design`). The gains
-    are not
-    printed: ours are steady-state Kalman gains with the covariances of `_UioCovariances`.
+    are not printed: ours are steady-state Kalman gains for white second derivatives of d1 (0.1 m2/s5) and d2 (0.1
+    m2/s7), 5 cm/s on an odometer reading every 0.1 s and 10 cm on a balise every second.
     It leans on the odometer: while the wheels of a locomotive spin its position is off by metres, and true balises may
     lie outside the gate, which then finds its way back by the ones that follow.
 
@@ -132,30 +107,3 @@ class DiscreteUio(TrainObserver):
 
 def _drag_slope(p: Any) -> Array:
     return (p.davis_b + p.davis_c * p.linearisation_speed) / p.mass
-
-
-def _uio_gains(covariances: _UioCovariances, drag_slope: float) -> tuple[np.ndarray, np.ndarray]:
-    """Steady-state Kalman gains of the two channels, each at its own sampling interval.
-
-    The model splits: the odometer sees (y, d2, d2') whatever the balises do, and the balises add (p, d1, d1'). Each
-    channel is a filter for white noise on its second disturbance derivative; the odometer one every `odometer_period`,
-    the balise one every `balise_gap`. The joint error is then block triangular, stable when both channels are.
-    """
-    shift = np.diag([1.0, 1.0], 1)
-    odometer = shift - np.diag([drag_slope, 0.0, 0.0])
-    K_odometer, K_balise = np.zeros(6), np.zeros(6)
-    K_odometer[[1, 3, 5]] = _channel_gain(
-        odometer, covariances.disturbance_noise, covariances.odometer_noise, covariances.odometer_period
-    )
-    K_balise[[0, 2, 4]] = _channel_gain(shift, covariances.slip_noise, covariances.balise_noise, covariances.balise_gap)
-    return K_odometer, K_balise
-
-
-def _channel_gain(A: np.ndarray, density: float, variance: float, interval: float) -> np.ndarray:
-    """Filter gain ``P C' / (C P C' + R)`` of a chain of three, white noise into its last state, first state
-    measured.
-    """
-    C = np.array([[1.0, 0.0, 0.0]])
-    transition, process = scipy.linalg.expm(A * interval), process_covariance(A, np.diag([0.0, 0.0, density]), interval)
-    P = scipy.linalg.solve_discrete_are(transition.T, C.T, process, np.array([[variance]]))
-    return np.asarray((P @ C.T)[:, 0] / (C @ P @ C.T + variance)[0, 0])
