@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from plant_models.exhibits.cart_pendulum import CartPendulum
 from plant_models.exhibits.noisy_plant import NoisyPlant, solved_2
-from plant_models.hybrid import Array, discrete_output, input_signal, output_signal, parameter, state
+from plant_models.hybrid import Array, discrete_output, output_signal, parameter, state
 
 Pair = tuple[Array, Array]
 
@@ -73,19 +74,16 @@ class CartDoublePendulum(NoisyPlant):
     name = "cart_double_pendulum"
     description = "Cart with an inverted double pendulum, driven by a force"
     source = "Allaoui 2024, (4.11) to (4.18), section IV.2.2.3"
-    internal_step = 1e-3
     moving = (
-        state("cart_position", "m", 0.0, "Position of the cart"),
-        state("cart_speed", "m/s", 0.0, "Speed of the cart"),
+        *CartPendulum.moving[:2],
         state("lower_angle", "rad", 0.3, "Angle of the lower rod from upright"),
         state("lower_rate", "rad/s", 0.0, "Angular speed of the lower rod"),
         state("upper_angle", "rad", -0.2, "Angle of the upper rod from upright"),
         state("upper_rate", "rad/s", 0.0, "Angular speed of the upper rod"),
     )
-    inputs = (input_signal("force", "N", 0.0, "Force on the cart"),)
+    inputs = CartPendulum.inputs
     plain_outputs = (
-        output_signal("position", "m", "Position of the cart"),
-        output_signal("speed", "m/s", "Speed of the cart", display_unit="km/h"),
+        *CartPendulum.plain_outputs[:2],
         output_signal("first_angle", "rad", "Angle of the lower rod from upright"),
         output_signal("first_rate", "rad/s", "Angular speed of the lower rod"),
         output_signal("second_angle", "rad", "Angle of the upper rod from upright"),

@@ -9,17 +9,9 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, output_signal, parameter, state
+from plant_models.hybrid import Array, HybridSystem, Signal, output_signal, parameter, state
 from plant_models.hybrid.option import require_chosen
-from plant_models.railway.control.effort_limits import (
-    DRIVE_AND_BRAKES,
-    FOLLOWED,
-    PRESETS,
-    air_brake_demand,
-    electric_brake_limit,
-    electric_part,
-    traction_limit,
-)
+from plant_models.railway.control import effort_limits
 from plant_models.railway.control.logic import either, every, holds
 
 Drive = Literal["immediate", "ramped"]
@@ -85,8 +77,8 @@ class AdrcController(HybridSystem):
         state("built_up_brake", "N", 0.0, "Force that the air brake is believed to have built up"),
     )
     inputs = (
-        input_signal("odometer", "m/s", 0.0, "Odometer speed", display_unit="km/h"),
-        *FOLLOWED,
+        effort_limits.ODOMETER,
+        *effort_limits.FOLLOWED,
     )
     outputs = (
         output_signal("effort", "N", "Effort demand of the locomotive's drive: traction > 0, electric brake < 0"),
@@ -94,15 +86,15 @@ class AdrcController(HybridSystem):
         output_signal("disturbance_force", "N", "Everything that resists beyond M dv = F, as estimated: -M z2"),
     )
     parameters: tuple[Signal, ...] = (
-        parameter("mass", "kg", 166e3, "Mass of the train M", min=1.0),
+        effort_limits.TRAIN_MASS,
         parameter("control_bandwidth", "rad/s", 0.5, "Bandwidth of the control law wc", min=1e-3),
         parameter("observer_bandwidth", "rad/s", 1.5, "Bandwidth of the extended state observer wo", min=1e-3),
-        *DRIVE_AND_BRAKES,
-        parameter("service_deceleration", "m/s2", 0.2, "Deceleration of the reference from which air is used", min=0.0),
-        parameter("holding_effort", "N", 60e3, "Brake force that holds the train at standstill", min=0.0),
+        *effort_limits.DRIVE_AND_BRAKES,
+        effort_limits.SERVICE_DECELERATION,
+        effort_limits.HOLDING_EFFORT,
         parameter("standstill_speed", "m/s", 0.1, "Odometer speed below which it stands", min=0.0, display_unit="km/h"),
     )
-    presets = PRESETS
+    presets = effort_limits.PRESETS
     default_preset = "train"
     option_choices = {"drive": ("immediate", "ramped")}
 
@@ -114,7 +106,7 @@ class AdrcController(HybridSystem):
             self.parameters = (
                 *self.parameters,
                 parameter("effort_lag", "s", 0.1, "Time constant of the drive", min=0.01),
-                parameter("effort_rate", "N/s", 68e3, "Largest rate of the effort", min=1.0),
+                effort_limits.EFFORT_RATE,
             )
         super().__init__(drive=drive)
 
@@ -153,23 +145,27 @@ class AdrcController(HybridSystem):
         acceleration, air = u.acceleration_reference, holds(p.full_brake_force > 0.0)
         error, estimated = u.speed_reference - x.observed_speed, x.disturbance_acceleration
         wanted = _rejecting_force(error, acceleration, estimated, p.mass, p.control_bandwidth)
-        brake_limit = electric_brake_limit(
+        brake_limit = effort_limits.electric_brake_limit(
             u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end
         )
         effort = np.where(
             wanted < 0.0,
-            electric_part(wanted, x.built_up_brake, brake_limit),
-            np.minimum(wanted, traction_limit(u.odometer, p.effort_limit, p.power_limit)),
+            effort_limits.electric_part(wanted, x.built_up_brake, brake_limit),
+            np.minimum(wanted, effort_limits.traction_limit(u.odometer, p.effort_limit, p.power_limit)),
         )
         slow = holds(np.abs(u.odometer) < np.maximum(p.electric_fade_start, p.standstill_speed))
         service = np.maximum(holds(acceleration < -p.service_deceleration), slow)
-        demand = either(service, air_brake_demand(wanted, p.full_brake_force, p.full_brake_force), 0.0)
+        demand = either(service, effort_limits.air_brake_demand(wanted, p.full_brake_force, p.full_brake_force), 0.0)
         to_stand = every(holds(u.speed_reference <= 0.0), holds(acceleration <= 0.0))
         standing = every(to_stand, holds(np.abs(u.odometer) < p.standstill_speed))
         holding_effort = either(air, 0.0, -np.minimum(p.holding_effort, p.electric_brake_limit))
         return _Command(
             either(standing, holding_effort, effort),
-            either(standing, air_brake_demand(-p.holding_effort, p.full_brake_force, p.full_brake_force), demand),
+            either(
+                standing,
+                effort_limits.air_brake_demand(-p.holding_effort, p.full_brake_force, p.full_brake_force),
+                demand,
+            ),
             standing,
         )
 

@@ -11,6 +11,13 @@ import numpy as np
 
 from plant_models.hybrid import Array, input_signal, parameter
 
+ODOMETER = input_signal("odometer", "m/s", 0.0, "Odometer speed", display_unit="km/h")
+TRAIN_MASS = parameter("mass", "kg", 166e3, "Mass of the train M", min=1.0)
+EFFORT_RATE = parameter("effort_rate", "N/s", 68e3, "Largest rate of the effort", min=1.0)
+SERVICE_DECELERATION = parameter(
+    "service_deceleration", "m/s2", 0.2, "Deceleration of the reference from which air is used", min=0.0
+)
+HOLDING_EFFORT = parameter("holding_effort", "N", 60e3, "Brake force that holds the train at standstill", min=0.0)
 DRIVE_AND_BRAKES = (
     parameter("effort_limit", "N", 350e3, "Largest traction effort", min=1.0),
     parameter("power_limit", "W", 4.2e6, "Largest traction power", min=1.0),

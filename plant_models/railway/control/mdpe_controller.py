@@ -12,15 +12,7 @@ import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, PeriodicEvent
 from plant_models.hybrid.signal import discrete_output, input_signal, memory, output_signal, parameter
-from plant_models.railway.control.effort_limits import (
-    DRIVE_AND_BRAKES,
-    FOLLOWED,
-    PRESETS,
-    air_brake_demand,
-    electric_brake_limit,
-    electric_part,
-    traction_limit,
-)
+from plant_models.railway.control import effort_limits
 from plant_models.railway.control.logic import either, every, holds, some
 from plant_models.railway.control.mode_switch import (
     COMBINED,
@@ -113,7 +105,7 @@ class MdpeController(HybridSystem):
         memory("sanding", "1", 0.0, "1 while sand is requested"),
     )
     inputs = (
-        input_signal("odometer", "m/s", 0.0, "Odometer speed", display_unit="km/h"),
+        effort_limits.ODOMETER,
         input_signal("speed", "m/s", 0.0, "Estimated speed of the train", display_unit="km/h"),
         input_signal("adhesion_force", "N", 0.0, "Estimated adhesion force of the locomotive"),
         input_signal("slip", "1", 0.0, "Estimated slip ratio"),
@@ -125,7 +117,7 @@ class MdpeController(HybridSystem):
         input_signal(
             "slope", "1", 0.0, "Gradient of the track from the track data, uphill > 0; sine of the angle", optional=True
         ),
-        *FOLLOWED,
+        *effort_limits.FOLLOWED,
     )
     outputs = (
         discrete_output("effort", "N", "Effort of the locomotive's drive: traction > 0, electric brake < 0"),
@@ -139,7 +131,7 @@ class MdpeController(HybridSystem):
     )
     parameters = (
         parameter("control_period", "s", 0.1, "Control period T", min=1e-3),
-        parameter("mass", "kg", 166e3, "Mass of the train M", min=1.0),
+        effort_limits.TRAIN_MASS,
         parameter("gravity", "m/s2", 9.81, "Acceleration of gravity g", min=0.0),
         parameter(
             "bandwidth_nominal",
@@ -152,7 +144,7 @@ class MdpeController(HybridSystem):
         parameter(
             "bandwidth_degraded", "rad/s", (0.25, 0.25, 0.1, 0.16), "Bandwidth, degraded adhesion", min=1e-3, size=4
         ),
-        *DRIVE_AND_BRAKES,
+        *effort_limits.DRIVE_AND_BRAKES,
         parameter(
             "adhesion_margin", "1", 0.85, "Share of the estimated adhesion force that is used in slip", min=0.0, max=1.0
         ),
@@ -169,23 +161,23 @@ class MdpeController(HybridSystem):
         parameter("recovery_nominal", "N/s", 50e3, "Rise of the available effort, nominal adhesion", min=0.0),
         parameter("recovery_degraded", "N/s", 5e3, "Rise of the available effort, degraded adhesion", min=0.0),
         parameter("recovery_time", "s", 5.0, "Time of nominal reports until the adhesion counts as nominal", min=0.0),
-        parameter("effort_rate", "N/s", 68e3, "Largest rate of the effort", min=1.0),
+        effort_limits.EFFORT_RATE,
         parameter("coupler_soft_limit", "N", 150e3, "Coupler force from which the rate is reduced", min=0.0),
         parameter("coupler_limit", "N", 250e3, "Coupler force that the effort must not exceed", min=1.0),
         parameter("acceleration_band", "m/s2", 0.05, "Reference acceleration that counts as none", min=0.0),
         parameter("error_band", "m/s", 0.1, "Error within which the train coasts", min=0.0, display_unit="km/h"),
-        parameter("service_deceleration", "m/s2", 0.2, "Deceleration of the reference from which air is used", min=0.0),
+        effort_limits.SERVICE_DECELERATION,
         parameter(
             "combined_error", "m/s", 0.5, "Excess speed from which both brakes act", min=0.0, display_unit="km/h"
         ),
         parameter(
             "sanding_error", "m/s", 2.0, "Tracking error in slip from which sand is used", min=0.0, display_unit="km/h"
         ),
-        parameter("holding_effort", "N", 60e3, "Brake force that holds the train at standstill", min=0.0),
+        effort_limits.HOLDING_EFFORT,
         parameter("standstill_speed", "m/s", 0.1, "Speed below which the train stands", min=0.0, display_unit="km/h"),
     )
     events = (PeriodicEvent("control", "control_period", description="Decision and control law"),)
-    presets = PRESETS
+    presets = effort_limits.PRESETS
     default_preset = "train"
 
     def jump(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -270,11 +262,13 @@ def _available(x: Any, u: Any, p: Any, level: Array, sliding: Array) -> Array:
 
 
 def _limits(x: Any, u: Any, p: Any, available: Array) -> _Limits:
-    electric = electric_brake_limit(u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end)
+    electric = effort_limits.electric_brake_limit(
+        u.odometer, p.electric_brake_limit, p.electric_fade_start, p.electric_fade_end
+    )
     largest = p.effort_rate * p.control_period
     down, up = _effort_steps(x.held_effort, u.coupler_force, largest, p.coupler_soft_limit, p.coupler_limit)
     return _Limits(
-        np.minimum(traction_limit(u.odometer, p.effort_limit, p.power_limit), available),
+        np.minimum(effort_limits.traction_limit(u.odometer, p.effort_limit, p.power_limit), available),
         np.minimum(electric, available),
         down,
         up,
@@ -319,8 +313,10 @@ def _share(x: Any, mode: Array, target: Array, standing: Array, limits: _Limits,
     """Effort [N] and demand to the air brake [1] for a target force."""
     capacity = p.full_brake_force + np.where(mode == COMBINED, limits.electric, 0.0)
     braked = either(standing, -p.holding_effort, target)
-    demand = either(holds(mode > 2.5), air_brake_demand(braked, capacity, p.full_brake_force), 0.0)
-    wanted = either(holds(mode == TRACTION), target, electric_part(braked, x.built_up_brake, limits.electric))
+    demand = either(holds(mode > 2.5), effort_limits.air_brake_demand(braked, capacity, p.full_brake_force), 0.0)
+    wanted = either(
+        holds(mode == TRACTION), target, effort_limits.electric_part(braked, x.built_up_brake, limits.electric)
+    )
     effort = _stepped_towards(x.held_effort, wanted, limits.down, limits.up)
     return np.minimum(np.maximum(effort, -limits.electric), limits.traction), demand
 

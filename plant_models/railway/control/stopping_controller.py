@@ -54,7 +54,6 @@ class StoppingController(HybridSystem):
     name = "stopping_controller"
     description = "Fault-tolerant stop at a mark: constant-brake plan, PI tracking with compensation, brake release"
     source = "Aguiar Cota 2019, (3.4)-(3.14), (3.34), Algorithm 3-1"
-    internal_step = 1e-3  # nothing flows
     states = (
         memory("held_effort", "N", 0.0, "Effort of this period"),
         memory("integral", "m", 0.0, "Integral of the speed error, p_i"),
