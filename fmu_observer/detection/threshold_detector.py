@@ -113,7 +113,6 @@ class ThresholdDetector(HybridSystem):
     name = "threshold_detector"
     description = "Fault detector with three thresholds: begin, quiet, end of a fault in a residual"
     source = "Aguiar Cota 2019, (3.18), 3.2.2.3; the time-out is ours"
-    internal_step = 1e-3  # nothing flows
     states = THRESHOLD_MEMORY
     inputs = (input_signal("residual", "m/s", 0.0, "Measured minus estimated speed"),)
     outputs = (

@@ -105,7 +105,6 @@ class WheelSignature(HybridSystem):
         memory("held_time", "s", 0.0, "Time since the fault was told"),
     )
     events = (ODOMETER_SAMPLE,)
-    option_choices = {}
 
     def requirements(self, p: Any) -> dict[str, Array]:
         """Parameters keep their bounds, and the period is that of the training."""

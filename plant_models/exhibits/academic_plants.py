@@ -20,7 +20,6 @@ class NonTriangularisablePlant(HybridSystem):
     name = "non_triangularisable_plant"
     description = "Second academic plant of chapter 2: five states, no triangular form"
     source = "Bouchama 2024, section 2.5.2"
-    internal_step = 1e-3
     states = tuple(state(f"state_{i}", "1", 0.0, f"State {i}") for i in (1, 2, 3, 4, 5))
     inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
     outputs = (
@@ -60,7 +59,6 @@ class TriangularisablePlant(HybridSystem):
     name = "triangularisable_plant"
     description = "First academic plant of chapter 2: four states, one nonlinear damping"
     source = "Bouchama 2024, section 2.5.1"
-    internal_step = 1e-3
     states = tuple(state(f"state_{i}", "1", 1.0, f"State {i}") for i in (1, 2, 3, 4))
     inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
     outputs = (

@@ -46,7 +46,6 @@ class CartPendulum(NoisyPlant):
     name = "cart_pendulum"
     description = "Cart with an inverted pendulum, driven by a force"
     source = "Allaoui 2024, (4.1) to (4.10), Table 4.1"
-    internal_step = 1e-3
     moving = (
         state("cart_position", "m", 0.0, "Position of the cart"),
         state("cart_speed", "m/s", 0.0, "Speed of the cart"),

@@ -39,7 +39,6 @@ class FlexibleJointArm(HybridSystem):
     name = "flexible_joint_arm"
     description = "Robot arm with a flexible joint, two angles measured"
     source = "Hann 2014, (2.60) to (2.62)"
-    internal_step = 1e-3
     states = (
         state("motor_angle", "rad", 0.0, "Angle of the motor"),
         state("link_angle", "rad", 0.0, "Angle of the link"),

@@ -129,7 +129,6 @@ class TimeVaryingOscillator(HybridSystem):
     name = "time_varying_oscillator"
     description = "Time-varying oscillator with two unknown constants"
     source = "Hann 2014, (4.64)"
-    internal_step = 1e-3
     states = (state("state_1", "1", 20.0, "First state"), state("state_2", "1", -40.0, "Second state"))
     inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
     outputs = (

@@ -21,7 +21,6 @@ class ThreeStateCascade(NoisyPlant):
     name = "three_state_cascade"
     description = "Three states in a row, of which the first is measured"
     source = "Omar 2012, (4.6.12)-(4.6.13)"
-    internal_step = 1e-3
     moving = (
         state("state_1", "1", 2.0, "First state, which is measured"),
         state("state_2", "1/s", -2.7, "Second state"),

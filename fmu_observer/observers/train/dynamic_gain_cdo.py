@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from fmu_observer.observers.train.high_gain_observer import HighGainTrainObserver
-from fmu_observer.observers.train.train_signals import BALISE_INNOVATION
 from plant_models.hybrid import Array, Signal, output_signal, parameter, state
 
 START, LIMIT, RATE = 20.0, 8.0, 1.0 / 12.0  # [1/s], [1/s], [1] [ours], as `dynamic_high_gain`
@@ -29,7 +28,6 @@ class DynamicGainCdo(HighGainTrainObserver):
     description = "High-gain continuous-discrete observer whose gain starts sharp and settles by itself"
     source = "Hann 2014, Theorem 3.1, (3.5)-(3.8), on the train of Bouchama 2024, (3.1)-(3.3)"
     theta_name = "theta_limit"
-    innovation_state = BALISE_INNOVATION
     outputs = (*HighGainTrainObserver.outputs, output_signal("gain", "1/s", "High gain theta in force"))
     gain_states = (state("theta", "1/s", START, "High gain in force"),)
     stability_parameters = ("theta_limit", "high_gain")

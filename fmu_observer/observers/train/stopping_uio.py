@@ -78,7 +78,6 @@ class StoppingUio(GatedObserver, GapCertified):
         "Unknown-input observer for fault-tolerant stopping: speed, disturbance, and detection of a lost brake"
     )
     source = "Aguiar Cota 2019, (3.15)-(3.18) and 3.2.3"
-    internal_step = 1e-3
     weighing = "position"
     states = (
         POSITION,

@@ -25,7 +25,6 @@ class DriveShaft(HybridSystem):
     name = "drive_shaft"
     description = "Elastic drive shaft with gear between traction motors and wheels"
     source = "ours"
-    internal_step = 1e-3
     bounded_parameters = "all"
     states = (state("twist", "rad", 0.0, "Twist of the shaft, side of the motor"),)
     inputs = (

@@ -59,7 +59,6 @@ class _LongitudinalForces(HybridSystem):
             variability="continuous",
         ),
     )
-    presets = {}
     default_preset = "set_a"
     option_choices = {
         "zones": ("position", "time"),

@@ -84,9 +84,7 @@ class Train(HybridSystem):
     source = "Bouchama 2024, (4.1)-(4.6), Table 4.2 and section 4.1"
     method = "rosenbrock"  # the wheels' time constants are far below the step near standstill
     stiff = ("train_speed", "wagon_velocity", "axle_rate")  # with all momenta among them; the couplers are slow: 3.4 Hz
-    # to 4e-6 m/s in smooth motion, 5e-4 where a vehicle starts or stops, 2e-3 at the knocks of free play
-    internal_step = 1e-3
-    presets = {}
+    # at the usual step 4e-6 m/s in smooth motion, 5e-4 where a vehicle starts or stops, 2e-3 at the knocks of free play
     default_preset = "table_4_2"
     option_choices = {
         "wagons": range(1, 21),

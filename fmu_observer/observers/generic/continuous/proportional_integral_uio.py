@@ -55,7 +55,6 @@ class ProportionalIntegralUio(ModelObserver):
     name = "proportional_integral_uio"
     description = "Unknown-input observer that estimates the unknown inputs, continuous measurements"
     source = "Aguiar Cota 2019, (2.13)-(2.17)"
-    internal_step = 1e-3
     option_choices = {
         "model": tuple(MODELS),
         "rho": tuple(range(1, LARGEST + 1)),

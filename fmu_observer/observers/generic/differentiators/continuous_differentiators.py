@@ -25,7 +25,6 @@ class FilteringDifferentiator(SignalDifferentiator):
     name = "filtering_differentiator"
     description = "Filtering differentiator of a signal"
     source = "Bouchama 2024, (1.16), Theorem 4, general exponent"
-    internal_step = 1e-3
     method = "euler"  # Levant's discretisation; stages of a higher order see a signal that stands still while they move
     option_choices, least_filtering = FILTERED, 1
 
@@ -59,7 +58,6 @@ class LevantDifferentiator(SignalDifferentiator):
     name = "levant_differentiator"
     description = "Levant's exact differentiator of a signal"
     source = "Bouchama 2024, (1.14), Theorem 3, gains in working order"
-    internal_step = 1e-3
     method = "euler"  # Levant's discretisation; stages of a higher order see a signal that stands still while they move
     option_choices = {"order": tuple(range(LARGEST + 1))}
 

@@ -64,7 +64,6 @@ class GeneralTakagiSugenoCdo(GatedObserver, GapCertified):
         "Takagi-Sugeno continuous-discrete observer of any such model, continuous and aperiodic sampled outputs"
     )
     source = "Bouchama 2024, (2.6)"
-    internal_step = 1e-3
     option_choices = {"model": tuple(TAKAGI_SUGENO_MODELS), "premise": PREMISES}
 
     def __init__(
