@@ -21,8 +21,6 @@ def fail(t: Any, begin: float = FROM) -> None:
 
 class InFlow(HybridSystem):
     name = "failing"
-    description = "Fails in its flow"
-    source = "test"
     traceable = False
     internal_step = 0.01
     states = (state("x", "m", 0.0, "State"),)
@@ -118,8 +116,6 @@ class PlainStart(PlainStep):
 
 class Sine(HybridSystem):
     name = "sine"
-    description = "Something to measure"
-    source = "test"
     outputs = (output_signal("y", "m", "Sine"),)
 
     def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:

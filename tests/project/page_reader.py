@@ -27,8 +27,6 @@ class Engine(HybridSystem):
     """Its torque falls with the speed of the shaft."""
 
     name = "engine"
-    description = "An engine"
-    source = "tests"
     inputs = (input_signal("speed", "rad/s"),)
     outputs = (output_signal("torque", "N.m"),)
 
@@ -40,8 +38,6 @@ class Load(HybridSystem):
     """A mass that turns."""
 
     name = "load"
-    description = "A load"
-    source = "tests"
     states = (state("turning", "rad/s"),)
     inputs = (input_signal("torque", "N.m"),)
     outputs = (output_signal("speed", "rad/s"),)

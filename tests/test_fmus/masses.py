@@ -102,8 +102,6 @@ def linear_system(part: Part, step: float) -> HybridSystem:
 
     class Linear(HybridSystem):
         name = part.name
-        description = "A linear test system"
-        source = "tests"
         states = tuple(state(f"x{i + 1}", "1", part.x0[i]) for i in range(n))
         inputs = tuple(input_signal(v, units.get(v, "1")) for v in part.inputs)
         outputs = tuple(output_signal(v, units.get(v, "1")) for v in part.outputs)

@@ -20,8 +20,6 @@ class Runaway(HybridSystem):
     """``dv = growth v + push``: from 1 mm/s it is beyond 1000 m/s after ``ln(1e6) / growth``."""
 
     name = "runaway"
-    description = "A train that goes its own way"
-    source = "tests"
     states = (state("v", "m/s", 1e-3),)
     inputs = (input_signal("effort", "N"),)
     outputs = (output_signal("speed", "m/s"),)
@@ -45,8 +43,6 @@ class Limited(HybridSystem):
     """A driver whose effort stays within 100 N, until a power in it overflows."""
 
     name = "limited"
-    description = "A driver"
-    source = "tests"
     inputs = (input_signal("odometer", "m/s"),)
     outputs = (output_signal("effort", "N"), replace(output_signal("demand", "1"), min=0.0, max=1.0))
     parameters: ClassVar[Any] = (parameter("power", "1", 30.0),)

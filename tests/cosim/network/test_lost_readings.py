@@ -108,8 +108,6 @@ def waves_for(signals: Any) -> HybridSystem:
 
     class Waves(HybridSystem):
         name = "waves"
-        description = "Waves"
-        source = "test"
         internal_step = 1e-3
         states = (state("elapsed", "s", 0.0, "Time since the start"),)
         outputs = named

@@ -17,8 +17,6 @@ class Source(HybridSystem):
     """Outputs that are known at any time: ``3 sin(2 t)``, ``cos(2 t)`` and a ramp."""
 
     name = "source"
-    description = "Two sines and a ramp"
-    source = "test"
     internal_step = 1e-3
     states = (state("ramp", "m", 0.0, "Ramp"),)
     outputs = (
@@ -39,8 +37,6 @@ class Listener(HybridSystem):
     """Integrates `speed`, and is set to what packets of node 2 say; remembers all that it was told."""
 
     name = "listener"
-    description = "Listens to packets"
-    source = "test"
     internal_step = 1e-2
     states = (
         state("place", "m", 0.0, "Integral"),
