@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator
 
+from plant_models.hybrid.meant_number import meant_number
 from plant_models.hybrid.noise import FROM_NAME, SEED_EXPECTED, is_seed
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
@@ -16,7 +17,8 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 def _seed(value: Any) -> int:
     if not isinstance(value, bool) and isinstance(value, Real) and is_seed(float(value)):
         return int(float(value))
-    raise ValueError(f"expected {SEED_EXPECTED} (got {value!r})")
+    meant = meant_number(value, whole=True) if isinstance(value, str) else ""
+    raise ValueError(f"expected {SEED_EXPECTED}{meant} (got {value!r})")
 
 
 def _own_seed(value: Any) -> int:

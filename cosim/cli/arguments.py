@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.cli.commands import Argument, argument
+from fmus.cli.parsers import no_number
 
 _DEFAULT_SCENARIO = "freight_profile_d"
 OVERRIDES = (
@@ -73,7 +74,7 @@ def positive(text: str) -> int:
     try:
         value = int(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a whole number (got {text!r})") from None
+        raise argparse.ArgumentTypeError(no_number(text, whole=True)) from None
     if value < 1:
         raise argparse.ArgumentTypeError(f"must be at least 1 (got {value})")
     return value

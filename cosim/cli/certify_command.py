@@ -5,13 +5,14 @@ for those of a scenario.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from cosim.certify import Certified, Demands, certified, findings_table, scenario_observers, simulated
 from cosim.cli.arguments import settings_argument
 from cosim.cli.model_info import declared_model, in_own_words
-from cosim.cli.scenarios import load_scenario, parse_setting
+from cosim.cli.scenarios import load_scenario, read_setting
 from cosim.errors import CosimError
 from cosim.run.component_models import make_declared, stated_parameters
 from cosim.run.run_seeds import with_seeds
@@ -98,10 +99,13 @@ def _observers(options: argparse.Namespace, demands: Demands) -> list[Certified]
     if options.what in shipped_scenarios() or Path(options.what).suffix.lower() in (".toml", ".ssp"):
         gains = _gains_file(options.what)
         return _of_scenario(options, demands) if gains is None else [_of_gains(gains, options, demands)]
-    made = declared_model(options.what, "certify", ("observer",), dict(map(parse_setting, options.option)))
-    return [
-        _certified(options.what, made, dict(map(parse_setting, options.settings)), options.preset, options, demands)
-    ]
+    made = declared_model(options.what, "certify", ("observer",), _read("--option", options.option))
+    return [_certified(options.what, made, _read("--set", options.settings), options.preset, options, demands)]
+
+
+def _read(option: str, texts: Sequence[str]) -> dict[str, Any]:
+    """Values by name."""
+    return dict(read_setting(option, text) for text in texts)
 
 
 def _gains_file(what: str) -> ComponentTable | None:
@@ -115,7 +119,7 @@ def _gains_file(what: str) -> ComponentTable | None:
 
 def _of_gains(table: ComponentTable, options: argparse.Namespace, demands: Demands) -> Certified:
     made: Any = make_declared(table, options.what)
-    parameters = stated_parameters(table, made) | dict(map(parse_setting, options.settings))
+    parameters = stated_parameters(table, made) | _read("--set", options.settings)
     return _certified(str(table.observer), made, parameters, options.preset or table.preset, options, demands)
 
 

@@ -11,6 +11,7 @@ from cosim.cli.scenarios import parse_setting, simulated_time_bar
 from cosim.provenance import rerun
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
+from fmus.cli.parsers import no_number
 
 EQUAL, DIFFERS, ERROR = 0, 1, 2
 DESCRIPTION = (
@@ -24,7 +25,7 @@ def _share(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"expected a number such as 1e-6 (got {text!r})") from None
+        raise argparse.ArgumentTypeError(no_number(text)) from None
     if not 0.0 <= value < float("inf"):
         raise argparse.ArgumentTypeError(f"must be zero or positive (got {text})")
     return value

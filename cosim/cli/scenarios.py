@@ -11,7 +11,9 @@ from cosim.components.recording_data import Chosen, Interpolation
 from cosim.errors import ScenarioError
 from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
+from fmus.cli.parsers import no_number
 from fmus.cli.progress import SIMULATED_TIME, ProgressBar
+from plant_models.hybrid.meant_number import meant_number
 
 
 def load_scenario(options: argparse.Namespace, loaded: Scenario | None = None) -> Scenario:
@@ -53,6 +55,21 @@ def parse_setting(text: str) -> tuple[str, Any]:
         return name.strip(), value.strip()
 
 
+def read_setting(option: str, text: str) -> tuple[str, Any]:
+    """``name=value`` as `parse_setting` reads it, where a value that means a number is one.
+
+    Args:
+        option: in which it was typed, for messages. text: as it was typed.
+
+    Raises:
+        ScenarioError: there is no ``=``, or a number has a decimal comma or a unit.
+    """
+    name, value = parse_setting(text)
+    if isinstance(value, str) and meant_number(value):
+        raise ScenarioError(f"{option} {name}: {no_number(value)}.")
+    return name, value
+
+
 def between_samples(texts: Sequence[str]) -> Chosen:
     """What ``--between`` says: of all inputs, or of some.
 
@@ -83,5 +100,5 @@ def setting_number(option: str, name: str, value: Any) -> float:
         ScenarioError: it is none.
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ScenarioError(f"{option} {name}={value}: expected a number.")
+        raise ScenarioError(f"{option} {name}: {no_number(str(value))}.")
     return float(value)

@@ -27,6 +27,8 @@ DONE, _SOME_FAILED = 0, 1
 RANGE = re.compile(r"(-?\d+):(-?\d+)(?::(-?\d+))?")
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 SPAN = re.compile(rf"({NUMBER})\.\.({NUMBER})")
+_WITH_COMMA = re.compile(r"(?<![\d.])(-?\d+),(0\d+)")
+"""A decimal comma: no number begins with a zero and another digit."""
 _VARY = """values to vary, may be repeated: NAME=70e3,80e3 a list; NAME=0:10 the whole numbers from 0 to 9; NAME=70e3..90e3
 a range, with --samples"""  # noqa: E501
 
@@ -158,7 +160,12 @@ def parse_values(text: str) -> Any:
             return uniform(float(match[1]), float(match[2]))
         except ScenarioError as error:
             raise ScenarioError(f"--vary: {text}: {error}") from error
+    if ".." in text:
+        raise ScenarioError(f"--vary: {text}: expected a range of two numbers, such as 70e3..90e3, with points.")
     try:
         return list(tomllib.loads(f"value = [{text}]")["value"])
     except tomllib.TOMLDecodeError:
+        if (found := _WITH_COMMA.search(text)) is not None:
+            meant = f"{found[1]}.{found[2]}"
+            raise ScenarioError(f"--vary: {text}: a comma stands between values; write {meant} with a point.") from None
         return [parse_setting(f"value={part}")[1] for part in text.split(",")]

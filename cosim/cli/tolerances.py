@@ -15,6 +15,8 @@ from cosim.comparison.tolerance import KEYS, Tolerance, Tolerances, tolerance
 from cosim.errors import ComparisonError, nearest
 from cosim.scenario.toml_file import read_toml
 from fmus.cli.commands import argument, repeated
+from fmus.cli.parsers import no_number
+from plant_models.hybrid.meant_number import meant_number
 
 Asked = tuple[dict[str, Any], dict[str, Any], list[str]]
 """Keys of the default tolerance, tolerances by signal or pattern, and what to ignore."""
@@ -95,6 +97,8 @@ def _setting(text: str) -> tuple[str, Any]:
             return name.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
     except tomllib.TOMLDecodeError:
         pass
+    if name.strip() and meant_number(value):
+        raise ComparisonError(f"--set-tolerance {name.strip()}: {no_number(value.strip())}.")
     raise ComparisonError(f"--set-tolerance {text!r}: expected SIGNAL=VALUE, for instance {_BY_SIGNAL_EXAMPLE}.")
 
 

@@ -7,7 +7,7 @@ import logging
 from pathlib import Path
 
 from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
-from cosim.cli.scenarios import load_scenario, parse_setting
+from cosim.cli.scenarios import load_scenario, read_setting
 from cosim.errors import ScenarioError
 from cosim.results.results_folder import check_writable
 from cosim.simulation.scenario import Scenario
@@ -16,6 +16,7 @@ from cosim.tuning.tune import tune
 from cosim.tuning.tuning_result import Tuning
 from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
+from fmus.cli.parsers import no_number
 from fmus.cli.progress import ProgressBar
 from plant_models.hybrid.casadi_package import demand_casadi
 
@@ -32,7 +33,7 @@ def _seeds(text: str) -> list[int]:
         else:
             found = [int(part) for part in text.split(",")]
     except ValueError:
-        raise argparse.ArgumentTypeError(f"expected seeds such as 3, 0:4 or 1,5,7 (got {text!r})") from None
+        raise argparse.ArgumentTypeError(f"expected whole numbers such as 3, 0:4 or 1,5,7 (got {text!r})") from None
     if not found:
         raise argparse.ArgumentTypeError(f"{text} holds no seeds; 0:4 are those from 0 to 3")
     return found
@@ -126,7 +127,7 @@ def _tuned(scenario: Scenario, options: argparse.Namespace, directory: Path) -> 
             validate=options.validate,
             iterations=options.iterations,
             searches=options.searches,
-            options=dict(parse_setting(text) for text in options.option),
+            options=dict(read_setting("--option", text) for text in options.option),
             directory=directory,
             **many_runs(options),
             whole_runs=options.whole_runs,
@@ -142,12 +143,17 @@ def _bounds(text: str) -> tuple[str, Bounds]:
     """
     name, sign, limits = (part.strip() for part in text.partition("="))
     low, *rest = limits.split(":")
-    try:
-        if not (name and sign) or len(rest) not in {1, 2} or rest[1:] not in ([], ["log"]):
-            raise ValueError
-        return name, (float(low), float(rest[0]), len(rest) == 2)
-    except ValueError:
+    if not (name and sign) or len(rest) not in {1, 2} or rest[1:] not in ([], ["log"]):
         raise ScenarioError(
             f"--parameters {text!r}: expected NAME=LOW:HIGH or NAME=LOW:HIGH:log, such as theta=0.1:5; an optimiser "
             "does not search without bounds."
-        ) from None
+        )
+    return name, (_bound(name, low), _bound(name, rest[0]), len(rest) == 2)
+
+
+def _bound(name: str, text: str) -> float:
+    """A bound of a parameter."""
+    try:
+        return float(text)
+    except ValueError:
+        raise ScenarioError(f"--parameters {name}: {no_number(text)}.") from None

@@ -13,11 +13,11 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from cosim.components.described import DescribedComponent
-from cosim.components.meant_number import meant_number
 from cosim.errors import CouplingError, nearest
 from fmus.fmi.elements import described
 from fmus.fmi.types import CTYPES, FLOATING_TYPES, NUMERIC_TYPES, enumeration_items, size
 from fmus.fmi.units import Units
+from plant_models.hybrid.meant_number import meant_number
 
 Scalar = float | int | bool | str | bytes
 StartValue = Scalar | list[Scalar]
@@ -167,7 +167,8 @@ def _floating(kind: str, value: float) -> float:
 
 def _whole(kind: str, value: Any) -> int:
     if not (isinstance(value, (bool, int)) or (isinstance(value, float) and value.is_integer())):
-        raise ValueError(f"expected a whole number for a {kind} (got {value!r})")
+        meant = meant_number(value, whole=True) if isinstance(value, str) else ""
+        raise ValueError(f"expected a whole number for a {kind}{meant} (got {value!r})")
     _, _, dtype = CTYPES.get(kind, CTYPES["Int64"])
     low, high = np.iinfo(dtype).min, np.iinfo(dtype).max
     if not low <= value <= high:

@@ -14,6 +14,7 @@ from cosim.results.formats.known_formats import FORMATS
 from cosim.scenario.model_name import Model
 from cosim.toml_table import Name, OwnSeed, TomlTable
 from fmu_observer.event_protocol import LatePolicy
+from plant_models.hybrid.meant_number import meant_number
 from plant_models.hybrid.noise import FROM_NAME, OWN_SEED_EXPECTED
 
 
@@ -67,7 +68,8 @@ def _tolerance(value: Any) -> float | str:
         return str(value)
     if isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf:
         return float(value)
-    raise ValueError("expected a relative tolerance above 0, or 'none' to give none")
+    meant = meant_number(value) if isinstance(value, str) else ""
+    raise ValueError(f"expected a relative tolerance, a number above 0, or 'none'{meant} (got {value!r})")
 
 
 Tolerance = Annotated[float | Literal["none"], PlainValidator(_tolerance)]

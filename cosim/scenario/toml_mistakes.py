@@ -14,7 +14,7 @@ _MARKS = dict.fromkeys("“”„‟«»", '"') | dict.fromkeys("‘’‚‛", 
 _KEY = r"^\s*(?P<key>[\w.\"'-]+)\s*"
 _END = r"\s*,?\s*(#.*)?$"
 _NUMBER = r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?"
-_WITH_COMMA = r"=\s*(?P<whole>[-+]?\d+),(?P<part>\d+(?:[eE][-+]?\d+)?)"
+_WITH_COMMA = r"=\s*(?P<whole>[-+]?\d+(?:\.\d{3})*),(?P<part>\d+(?:[eE][-+]?\d+)?)"
 
 
 def mistake(text: str, reason: str) -> str:
@@ -74,7 +74,8 @@ def _comma(line: str) -> str:
     if found is None:
         return ""
     written = f"{found['key']} = {found['whole']}"
-    return f"{written},{found['part']} has a decimal comma; write a point: {written}.{found['part']}"
+    meant = f"{found['key']} = {found['whole'].replace('.', '')}.{found['part']}"
+    return f"{written},{found['part']} has a decimal comma; write a point: {meant}"
 
 
 def _truth(line: str) -> str:

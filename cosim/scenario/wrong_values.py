@@ -6,17 +6,17 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from cosim.components.meant_number import meant_number
 from cosim.errors import nearest
+from plant_models.hybrid.meant_number import meant_number
 
 _CHOICE = re.compile(r"'([^']*)'")
-_NUMBER = "expected a number"
+_NUMBER, _WHOLE = "expected a number", "expected a whole number"
 _KINDS = {
     "float_parsing": _NUMBER,
     "float_type": _NUMBER,
-    "int_parsing": "expected a whole number",
-    "int_type": "expected a whole number",
-    "int_from_float": "expected a whole number",
+    "int_parsing": _WHOLE,
+    "int_type": _WHOLE,
+    "int_from_float": _WHOLE,
     "bool_parsing": "expected true or false",
     "bool_type": "expected true or false",
     "finite_number": "expected a finite number",
@@ -53,4 +53,6 @@ def wrong_value(item: Mapping[str, Any]) -> str:
         key, text = _BOUNDS[kind]
         return text.format(context[key])
     expected = _KINDS.get(kind, str(item["msg"]))
-    return expected + (meant_number(stated) if _NUMBER in expected and isinstance(stated, str) else "")
+    if not isinstance(stated, str) or expected not in (_NUMBER, _WHOLE):
+        return expected
+    return expected + meant_number(stated, whole=expected == _WHOLE)

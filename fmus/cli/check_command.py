@@ -18,6 +18,7 @@ from fmus.check.run import CheckReport, check_count, check_fmu
 from fmus.cli.colour import Role
 from fmus.cli.commands import argument, one_of, repeated
 from fmus.cli.output import Output
+from fmus.cli.parsers import no_number
 from fmus.cli.progress import ProgressBar
 from fmus.fmi.archive import open_archive
 from fmus.fmi.standard import INTERFACES
@@ -101,12 +102,12 @@ def _starts(words: Sequence[str]) -> dict[str, float]:
     starts = {}
     for word in words:
         name, equals, value = word.partition("=")
+        if not equals or not name:
+            raise ValueError(f"--start {word!r}: write it as name=number, e.g. --start mass=80e3.")
         try:
-            if not equals or not name:
-                raise ValueError
             starts[name] = _TRUTH[value.lower()] if value.lower() in _TRUTH else float(value)
         except ValueError:
-            raise ValueError(f"--start {word!r}: write it as name=number, e.g. --start mass=80e3.") from None
+            raise ValueError(f"--start {name}: {no_number(value)}.") from None
     return starts
 
 

@@ -17,8 +17,8 @@ MISTAKE = 2
 """Exit code of a mistake on the command line."""
 
 
-_VALUES = {"int": "a whole number", "float": "a number, such as 0.1"}
-"""What is expected, by the name that argparse has for it."""
+_REFUSED = re.compile(r"invalid (int|float) value: '(.*)'")
+"""What argparse says where a value is no number."""
 
 
 class _Help(argparse.HelpFormatter):
@@ -59,8 +59,7 @@ class Parser(argparse.ArgumentParser):
         Raises:
             SystemExit: in any case.
         """
-        for kind, expected in _VALUES.items():
-            message = re.sub(rf"invalid {kind} value: (.*)", rf"expected {expected} (got \1)", message)
+        message = _REFUSED.sub(lambda found: no_number(found[2], whole=found[1] == "int"), message)
         print_error(self.prog, f"{message} (see '{self.prog} --help')")
         raise SystemExit(MISTAKE)
 
@@ -91,6 +90,18 @@ class Parser(argparse.ArgumentParser):
         known = [option for action in self._actions for option in action.option_strings]
         near = get_close_matches(unknown[0].partition("=")[0], known, 1) if unknown[0].startswith("-") else []
         self.error(f"no option {unknown[0]}; did you mean {near[0]}?" if near else f"not expected: {' '.join(unknown)}")
+
+
+def no_number(text: str, *, whole: bool = False) -> str:
+    """What to answer where a text is no number.
+
+    Args:
+        text: as it was typed. whole: whether a whole number was expected.
+    """
+    from plant_models.hybrid.meant_number import meant_number  # noqa: PLC0415 - only for mistakes
+
+    kind = "a whole number" if whole else "a number"
+    return f"expected {kind}{meant_number(text, whole=whole) or ('' if whole else ', such as 0.1')} (got {text!r})"
 
 
 def print_error(program: str, text: str) -> None:

@@ -1,0 +1,59 @@
+"""What number a text means that stands in place of one: with a decimal comma, or with a unit behind it."""
+
+from __future__ import annotations
+
+import re
+
+from plant_models.hybrid.units import UnitError, conversion, parse_unit
+
+_WHOLE = r"[-+]?(?:\d{1,3}(?:\.\d{3})+(?=,)|\d{1,3}(?:\.\d{3}){2,}|\d{1,3}(?:[' \u202f]\d{3})+|\d+)"
+"""German, Swiss or French: marks or blanks between thousands; a single point may be that of a decimal number."""
+_NUMBER = rf"(?P<whole>{_WHOLE})(?:(?P<mark>[.,])(?P<part>\d+))?(?P<power>[eE][-+]?\d+)?"
+_GROUPED = r"(?P<whole>[-+]?\d{1,3}(?:,\d{3})+)(?P<mark>\.)(?P<part>\d+)(?P<power>[eE][-+]?\d+)?"
+"""English: commas between thousands."""
+_UNIT = r"\s*(?P<unit>[A-Za-zµ°%‰][\w/.°%^*-]*)?"
+_MEANT = [re.compile(rf"\s*{number}{_UNIT}\s*") for number in (_GROUPED, _NUMBER)]
+_NO_DIGIT = re.compile(r"[^\d+-]")
+
+
+def meant_number(stated: str, unit: str = "", *, whole: bool = False) -> str:
+    """What to write in place of a text, as the end of a sentence that begins with 'expected a number'.
+
+    Args:
+        stated: the text. unit: name of the unit in which the number is expected; empty for SI units, or for none.
+        whole: whether a whole number is expected, which has no unit.
+
+    Returns:
+        Empty where the text means no number.
+    """
+    found = next((match for pattern in _MEANT if (match := pattern.fullmatch(stated)) is not None), None)
+    if found is None:
+        return ""
+    digits = _NO_DIGIT.sub("", found["whole"])
+    written = f"{digits}.{found['part']}" if found["part"] else digits
+    written += found["power"] or ""
+    if whole:
+        return _whole(float(written), found)
+    if found["unit"]:
+        return _without_unit(float(written), found["unit"], unit)
+    if digits != found["whole"]:
+        return f"; write {written}, with a point and no marks between thousands"
+    return f"; write a point in place of the comma: {written}" if found["mark"] == "," else ""
+
+
+def _whole(value: float, found: re.Match[str]) -> str:
+    marks = [name for name, there in (("comma", found["mark"] == ","), ("unit", found["unit"])) if there]
+    its = f"its {' and '.join(marks)}"
+    if value.is_integer():
+        return f"; write {value:.0f}" + (f" without {its}" if marks else ", with digits alone")
+    return f"; with {its} it means {value:g}" if marks else f"; {value:g} is none"
+
+
+def _without_unit(value: float, stated: str, unit: str) -> str:
+    expected = f"in {unit}" if unit else "in SI units"
+    try:
+        source = parse_unit(stated.replace("km/h", "km.h-1"))
+        factor, offset = conversion(source, parse_unit(unit)) if unit else (source.factor, source.offset)
+    except UnitError:
+        return f" without a unit, {expected}"
+    return f" without its unit, {expected}: {value * factor + offset:.10g}"
