@@ -32,6 +32,7 @@ from cosim.run.remarks import Remarks
 from cosim.run.services import Services
 from cosim.run.signal_roles import report_spec
 from cosim.run.summary import evaluated_summary, run_summary
+from cosim.run.values_not_taken import values_not_taken
 from cosim.structure.divergence import explained_failure
 from fmu_observer.annotated_variable import declared_warnings
 from plant_models.hybrid.missing import MISSED_SAMPLES
@@ -192,7 +193,9 @@ def execute(
         ready: the run. setup_seconds: wall time of the set-up [s]. call_log: where calls are logged; None for nowhere.
         interruption: that may end it early. remarks: of the run.
     """
-    executed = _step(ready, interruption)
+    executed = _step(ready, interruption, remarks)
+    if executed.failure is None:
+        remarks.warn(*(text for text in values_not_taken(ready.coupled, stepped=True) if text not in remarks.warnings))
     recorded = _as_recorded(ready)  # before a stream is finished: to ask for its rows again would reserve more
     premises = _remark_model(ready, recorded, remarks)
     summary = run_summary(ready.task, ready.master, setup_seconds)
@@ -210,7 +213,7 @@ def execute(
     return outcome.with_summary(expectations=[evaluated.to_data() for evaluated in evaluate(ready.task.table, outcome)])
 
 
-def _step(ready: Ready, interruption: Interruption) -> _Executed:
+def _step(ready: Ready, interruption: Interruption, remarks: Remarks) -> _Executed:
     """Run the master to its end or its first failure."""
     failure: str | None = None
     surroundings = SurroundingsOfSteps()
@@ -219,7 +222,12 @@ def _step(ready: Ready, interruption: Interruption) -> _Executed:
         surroundings.compare()
         interruption.check()
 
-    ready.master.between_steps = between_steps
+    def before_first_step() -> None:
+        ready.master.between_steps = between_steps
+        remarks.warn(*values_not_taken(ready.coupled))
+        between_steps()
+
+    ready.master.between_steps = before_first_step
     try:
         ready.master.run()
     except CosimError as error:

@@ -411,6 +411,12 @@ DEEDS = (
     "rounds",
     "paints",
     "interrupts",
+    "bounds",
+    "overwrites",
+    "warns",
+    "hangs-when-freed",
+    "hangs-when-terminated",
+    "fails-when-terminated",
 )
 """What `hostile_fmu` does with ``deed = 0, 1, 2, ...``"""
 
@@ -418,8 +424,9 @@ DEEDS = (
 def hostile_fmu(folder: Path, name: str = "hostile", beside: Path | None = None) -> Path:
     """An integrator, ``y' = 1`` (FMI 2.0), that harms its process in the step over the time ``at``; the parameter
     ``deed`` is the place in `DEEDS`: calls exit or _exit, raises SIGSEGV, never returns, changes the working directory
-    or the rounding mode, logs escape sequences, sends SIGINT to its own process. `beside` is a shared library that it
-    brings along."""
+    or the rounding mode, logs escape sequences, sends SIGINT to its own process, bounds ``at`` to 0.3, overwrites it
+    with that, returns a warning from there on, does not return from fmi2FreeInstance or fmi2Terminate, refuses the
+    latter. `beside` is a shared library that it brings along."""
     parameters = [Variable("deed", 1, "parameter", start=0.0), Variable("at", 2, "parameter", start=0.25)]
     variables = [TIME, *parameters, Variable("y", 3, "output")]
     return build_fmu(folder, name, "hostile.c", 2, variables, capability_flags(2), {}, beside=beside)

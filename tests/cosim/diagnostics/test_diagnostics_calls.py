@@ -76,7 +76,7 @@ def test_a_native_run_is_logged_call_by_call(version: Any, tmp_path: Path) -> No
         assert re.fullmatch(LIFE[version], own), own
     assert (calls[0]["time"], calls[-1]["time"]) == ("-", "0.3")
     begin = next(i for i, c in enumerate(calls) if c["what"].endswith("DoStep"))
-    end = next(i for i, c in enumerate(calls) if "Terminate" in c["what"])
+    end = next(i for i, c in enumerate(calls) if "Terminate" in c["what"]) - 1
     real = "Float64" if version == 3 else "Real"
     one_step = [
         ("first", "DoStep"),
@@ -86,6 +86,8 @@ def test_a_native_run_is_logged_call_by_call(version: Any, tmp_path: Path) -> No
         ("second", f"Get{real}"),
     ]
     assert [(c["who"], c["what"].removeprefix(f"fmi{version}")) for c in calls[begin:end]] == 3 * one_step
+    for back in (calls[begin - 1], calls[end]):  # what was set is read back before the first step and after the last
+        assert (back["who"], back["arguments"], back["out"]) == ("first", "u", "2")
     for k in range(3):
         step, read, write, _, _ = calls[begin + 5 * k : begin + 5 * (k + 1)]
         assert float(step["time"]) == pytest.approx(0.1 * k, abs=1e-12)

@@ -10,6 +10,9 @@
 #ifndef LEAVING
 #define LEAVING(event, model) /* fmi2Terminate and fmi2FreeInstance of one that does not go in peace */
 #endif
+#ifndef END_STATUS
+#define END_STATUS(model) fmi2OK /* of fmi2Terminate */
+#endif
 
 typedef struct {
     Model model;

@@ -46,7 +46,7 @@ fmi2Status fmi2Terminate(fmi2Component c) {
         REFUSE;
     LEAVING(TERMINATED, &instance->now.model);
     instance->now.mode = STOPPED;
-    return fmi2OK;
+    return END_STATUS(&instance->now.model);
 }
 
 #define VALUES(NAME, OWN, TYPE)                                                                                      \

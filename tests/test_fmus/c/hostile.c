@@ -7,7 +7,11 @@
 #include <signal.h>
 #include <unistd.h>
 
-enum { NOTHING, EXITS, EXITS_AT_ONCE, CRASHES, HANGS, CRASHES_FREED, CRASHES_TERMINATED, EXITS_FREED, MOVES, ROUNDS, PAINTS, INTERRUPTS };
+enum {
+    NOTHING, EXITS, EXITS_AT_ONCE, CRASHES, HANGS, CRASHES_FREED, CRASHES_TERMINATED, EXITS_FREED, MOVES, ROUNDS, PAINTS, INTERRUPTS,
+    BOUNDS, OVERWRITES, WARNS, HANGS_FREED, HANGS_TERMINATED, FAILS_TERMINATED,
+};
+#define BOUND 0.3 /* of BOUNDS: `at` is no later */
 
 typedef struct {
     double time, deed, at, y;
@@ -16,11 +20,17 @@ typedef struct {
 #include "plain.h"
 
 #define LEAVING(event, model) leave(event, model)
+#define END_STATUS(model) ((int)(model)->deed == FAILS_TERMINATED ? fmi2Error : fmi2OK)
 enum { TIME = 0, DEED = 1, AT_TIME = 2, Y = 3 };
 enum { TERMINATED, FREED };
 
 static void model_start(Model *m) { m->at = 0.25; }
-BEGINS_AT_ITS_TIME
+
+static void model_begin(Model *m, double t0) {
+    m->time = t0;
+    if ((int)m->deed == BOUNDS && m->at > BOUND)
+        m->at = BOUND;
+}
 
 VARIABLES(
     VARIABLE(DEED, F64, PARAMETER, deed)
@@ -33,6 +43,9 @@ static void leave(int event, const Model *m) {
     int deed = (int)m->deed;
     if (deed == (event == FREED ? CRASHES_FREED : CRASHES_TERMINATED))
         raise(SIGSEGV);
+    if (deed == (event == FREED ? HANGS_FREED : HANGS_TERMINATED))
+        for (;;)
+            pause();
     if (deed == EXITS_FREED && event == FREED)
         exit(0);
 }
@@ -54,9 +67,11 @@ static void do_harm(Host *host, int deed) {
 static Outcome model_step(Model *m, Host *host, double t, double until) {
     if (t < m->at - SAME && until >= m->at - SAME)
         do_harm(host, (int)m->deed);
+    if ((int)m->deed == OVERWRITES)
+        m->at = BOUND;
     m->y += until - t;
     m->time = until;
-    return (Outcome){.reached = until};
+    return (Outcome){.status = (int)m->deed == WARNS && t >= m->at - SAME ? WARNING : OK, .reached = until};
 }
 
 static Update model_update(Model *m, const Host *host, double t) {
