@@ -17,6 +17,7 @@ from cosim.run.component_models import make_declared
 from cosim.scenario.model_name import ModelName, settings_of
 from cosim.scenario.paths import absolute, move_file
 from cosim.scenario.scenario_tables import ComponentTable
+from cosim.scenario.schema import ScenarioTable
 from cosim.simulation.scenario import Scenario
 from plant_models.user_file import names_code
 
@@ -159,6 +160,15 @@ def _misfit(parts: ScenarioParts, system: Any, sources: Iterable[str]) -> str:
     return ""
 
 
+def named_receivers(table: ScenarioTable) -> list[str]:
+    """Who is notified of balises where the scenario names them; nobody where all that can be are.
+
+    Args:
+        table: the scenario.
+    """
+    return [] if table.balises is None else list(table.balises.receivers or [])
+
+
 def with_candidate(scenario: Scenario, candidate: BenchmarkCandidate) -> Scenario:
     """The scenario with an observer as it was played, on which its report is.
 
@@ -175,4 +185,6 @@ def with_candidate(scenario: Scenario, candidate: BenchmarkCandidate) -> Scenari
         changed.add(candidate.name, **candidate.table.model_dump(by_alias=True, exclude_unset=True))
         lines = [connection(link, f"{candidate.name}.{signal}") for signal, link in candidate.sources.items()]
         changed.connect(*lines)
+        if receivers := named_receivers(scenario.table()):
+            changed.balises(receivers=[*receivers, candidate.name])
     return changed.report(observers=[candidate.name])

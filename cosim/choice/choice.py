@@ -12,7 +12,7 @@ import tomli_w
 
 from cosim.choice.allowance import Allowance
 from cosim.choice.benchmark import ObserverBenchmark
-from cosim.choice.candidates import with_candidate
+from cosim.choice.candidates import named_receivers, with_candidate
 from cosim.choice.disturbances import Disturbance
 from cosim.choice.playback import connection
 from cosim.choice.ranking import Row
@@ -25,6 +25,9 @@ from fmus.tables.table import Column, Parts, Readable, Table, error_column, name
 
 INTERRUPTED = "interrupted"
 """Why fewer runs count where somebody wanted it so."""
+_UNCORRECTED = (
+    ". No telegram reached an observer in this run: the allowance counts from its start, and balises were not tried"
+)
 PLAIN = "odometer_reset"
 """What every observer has to beat."""
 _SHOWN = 8
@@ -85,7 +88,14 @@ class Choice(Readable):
             text = f"use {best.label}" + ("" if best.certified else " (nothing certifies it for these gaps)")
         else:
             text = f"nothing is safe here, least bad {best.label}, because of {best.why_not(self._acting(best))}"
-        return f"{stopped}{text}: {self._numbers(best)}"
+        return f"{stopped}{text}: {self._numbers(best)}{'' if self._corrected else _UNCORRECTED}"
+
+    @property
+    def _corrected(self) -> bool:
+        """Whether a telegram reached any observer in the nominal run."""
+        outcome = self.benchmark.outcomes.get(self.best.candidate.name)
+        events = [] if outcome is None else outcome.result.events
+        return outcome is None or any(what != "undelivered" for event in events for what in event.outcomes.values())
 
     @property
     def groups(self) -> dict[str, list[Row]]:
@@ -122,7 +132,10 @@ class Choice(Readable):
         table = candidate.table.model_dump(by_alias=True, exclude_unset=True)
         links = [connection(link, f"{name}.{signal}") for signal, link in candidate.sources.items()]
         text = tomli_w.dumps({"components": {name: table}})
-        return f"# into connections = [...]: {', '.join(map(repr, links))}\n{text}".rstrip()
+        lists = [f"# into connections = [...]: {', '.join(map(repr, links))}"]
+        if named_receivers(self.scenario.table()):
+            lists.append(f"# into [balises], receivers = [...]: {name!r}")
+        return "\n".join([*lists, text]).rstrip()
 
     def with_best(self) -> Scenario:
         """The scenario with the best observer, on which its report is.

@@ -234,8 +234,20 @@ def playback_scenario(
     if balises is not None:
         watched = {key: value for key in _ESTIMATES if (value := getattr(balises, key)) is not None}
         data["balises"] = watched | {"timing": balises.timing, "layout": "recorded", "file": str(folder.resolve())}
+        if balises.receivers is not None:
+            data["balises"]["receivers"] = [
+                one.name for one in listeners if _is_notified(one, table, balises.receivers)
+            ]
     data |= {"network": network} if network else {}
     return _scenario(scenario, disturb(data))
+
+
+def _is_notified(listener: Listener, table: ScenarioTable, receivers: Sequence[str]) -> bool:
+    """Whether balises reach an observer where receivers are named: one of them, or one that is put beside them."""
+    if listener.name in table.components:
+        return listener.name in receivers
+    system = make_declared(listener.table, listener.name)
+    return BALISE_EVENT in [event.name for event in getattr(system, "triggered_events", ())]
 
 
 def needed_components(parts: ScenarioParts, listener: Listener) -> list[str]:

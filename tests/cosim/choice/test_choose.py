@@ -112,6 +112,23 @@ def test_what_a_run_will_say_of_the_preset_is_said_with_the_answer() -> None:
     assert own.lines() == "# it is in the scenario already: components.observer"
 
 
+def test_balises_reach_whom_the_scenario_names_and_the_observer_that_is_chosen() -> None:
+    """What was measured with telegrams is written with them; an own observer that is not named has none."""
+    named = small().add("deaf", observer="odometer_reset", **{"as": "block3"}).balises(receivers=["observer"])
+    named.connect("odometer.reading -> deaf.odometer")
+    found = choose(named, ["deaf", "balise_odometer_ekf"], seeds=0)
+    telegrams = [event for outcome in found.benchmark.outcomes.values() for event in outcome.result.events]
+    assert {name for event in telegrams for name in event.outcomes} == {"balise_odometer_ekf"}
+    assert found.best.candidate.name == "balise_odometer_ekf"
+    assert found.with_best().table().balises.receivers == ["observer", "balise_odometer_ekf"]
+    assert "# into [balises], receivers = [...]: 'balise_odometer_ekf'" in found.lines()
+    assert "No telegram" not in found.answer
+
+
+def test_an_answer_without_any_telegram_says_so() -> None:
+    assert "No telegram reached an observer" in choose(small().balises(latency=9.0), ["odometer_reset"], seeds=0).answer
+
+
 def test_where_nothing_comes_through_there_is_no_best() -> None:
     found = choose(small(), ["luenberger"], seeds=1)
     assert not found.found
