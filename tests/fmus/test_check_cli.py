@@ -73,7 +73,7 @@ def test_json_in_place_of_the_table(honest: Path, capsys: Output) -> None:
     ("arguments", "words"),
     [
         (["--start", "forse=1"], "There is no variable 'forse' to set; did you mean 'force'?"),
-        (["--start", "force"], "--start force: expected a number, such as 0.1"),
+        (["--start", "force"], "write it as name=number"),
         (["--start", "force=strong"], "--start force: expected a number, such as 0.1"),
         (["--start", "position=1"], "position cannot be set: it is 'output'"),
         (["--step", "0"], "must be positive and finite"),
