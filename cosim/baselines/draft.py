@@ -21,6 +21,7 @@ from cosim.baselines.baseline import Header
 from cosim.baselines.header_data import VERSION
 from cosim.baselines.model_identity import identities
 from cosim.baselines.recipe import Recipe
+from cosim.comparison.compare import curve_of
 from cosim.comparison.event_comparison import TIMES, telegram_limits
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.errors import BaselineError, nearest
@@ -288,26 +289,12 @@ def _table_text(result: Result, rows: np.ndarray, tolerances: Tolerances) -> str
     decimals = _decimals_for(min(entry.time_for(length) for entry in entries))
     columns = [time_text(result.time[rows].tolist(), decimals)]
     for info in result.signals:
-        values = result.table[info.name]
-        decimals = _decimals_for(tolerances.for_signal(info.name).value_for(value_range(values)))
-        columns.append(_column_text(values[rows].tolist(), decimals))
+        decimals = _decimals_for(tolerances.value_for(info.name, curve_of(result, info.name)))
+        columns.append(_column_text(result.table[info.name][rows].tolist(), decimals))
     lines = io.StringIO()
     csv.writer(lines, lineterminator="\n").writerow(["time", *(info.name for info in result.signals)])
     lines.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
     return lines.getvalue()
-
-
-def value_range(values: np.ndarray) -> float:
-    """Largest minus smallest finite value of a signal; its size where it is constant; 0 where nothing is finite.
-
-    Args:
-        values: in the unit of the signal, shape (rows,).
-    """
-    finite = values[np.isfinite(values)]
-    if not finite.size:
-        return 0.0
-    spread = float(finite.max() - finite.min())
-    return spread if spread > 0.0 else float(np.abs(finite).max())
 
 
 def _events_text(result: Result, tolerance: Tolerance) -> str:

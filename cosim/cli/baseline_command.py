@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from cosim.baselines import check, read_baseline
 from cosim.baselines.baseline_files import baseline_path, write_texts
 from cosim.baselines.call import Call
-from cosim.baselines.draft import value_range
 from cosim.baselines.header_data import header_data
 from cosim.baselines.recipe import Recipe
 from cosim.baselines.references import embed_baseline, find_references, read_reference
@@ -21,6 +20,7 @@ from cosim.baselines.update import plan_update
 from cosim.cli.arguments import OVERRIDES, QUIET, settings_argument
 from cosim.cli.scenarios import between_samples, parse_setting, simulated_time_bar
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
+from cosim.comparison.compare import curve_of
 from cosim.comparison.comparison_text import comparison_parts, comparison_verdict, difference_parts
 from cosim.comparison.tolerance import Tolerances
 from cosim.components.description import read_description
@@ -264,7 +264,7 @@ def _header(baseline: Baseline) -> Parts:
 
 def _allowed(baseline: Baseline, name: str) -> float:
     """Largest error of a signal that is allowed, in its unit."""
-    return baseline.tolerances.for_signal(name).value_for(value_range(baseline.result.table[name]))
+    return baseline.tolerances.value_for(name, curve_of(baseline.result, name))
 
 
 def _free(path: Path, force: bool) -> Path:

@@ -275,6 +275,17 @@ def _nearest(name: str, known: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(whole + parts))[:3]
 
 
+def curve_of(side: Result, name: str) -> Curve:
+    """A signal of a result as a curve.
+
+    Args:
+        side: the result. name: of the signal.
+    """
+    values = np.asarray(side[name], dtype=float)
+    info = next((info for info in side.signals if info.name == name), SignalInfo(name))
+    return Curve(np.asarray(side.time, dtype=float), values, info.variability == "discrete" or is_held(values))
+
+
 class _Pair:
     """Two results whose signals are compared one by one."""
 
@@ -308,8 +319,8 @@ class _Pair:
             values[1] = factor * values[1] + offset
         held = "discrete" in (one.variability, two.variability) or all(map(is_held, values))
         reference, result = (Curve(time, v, held) for time, v in zip(self.times, values, strict=True))
-        tolerance = self.tolerances.for_signal(name)
-        return compare_signal(Task(name, one.unit, reference, result, tolerance, self.length, self.curves))
+        tolerance, allowed = self.tolerances.for_signal(name), self.tolerances.value_for(name, reference)
+        return compare_signal(Task(name, one.unit, reference, result, tolerance, allowed, self.length, self.curves))
 
     def lone(self, name: str, status: Literal["missing", "extra"]) -> SignalComparison:
         """The entry of a signal that only one side has, or that is ignored."""
@@ -328,9 +339,8 @@ class _Pair:
         reference, result = self.results
         if len(reference.time) != len(result.time):
             return ""
-        allowed = self.tolerances.for_signal(name)
         values = np.asarray(reference[name], dtype=float)
-        limit = allowed.value_for(Curve(reference.time, values).scale)
+        limit = self.tolerances.value_for(name, curve_of(reference, name))
         if not np.any(np.abs(values) > limit):
             return ""  # zeros have no name
         fits = (n for n in self.extra if np.all(np.abs(np.asarray(result[n], dtype=float) - values) <= limit))

@@ -12,6 +12,8 @@ from cosim.errors import ComparisonError
 _FEW_VALUES = 16  # a signal of so few whole numbers that mostly stands still is an indicator, a mode or a counter: held
 
 
+EQUAL_INSTANT = 1e-9
+"""Of the time: how far rounding, also that of a file, moves an instant."""
 ROUNDING, NOISE = 1e-12, 1e-6
 """Shares of the size of a signal: what rounding alone does, and the least range that is taken for one."""
 
@@ -59,6 +61,15 @@ class Curve:
             return 0.0
         size, spread = float(np.max(np.abs(values))), float(np.max(values)) - float(np.min(values))
         return max(spread, NOISE * size) if ROUNDING * size < spread < np.inf else size
+
+    @cached_property
+    def share_scale(self) -> float:
+        """What a tolerance for all signals is a share of: `scale`, and of whole numbers that are held one at most.
+
+        A fault code, a mode or a counter that is one off is another one, however far its values reach.
+        """
+        numbers = self.values[self.finite]
+        return min(self.scale, 1.0) if self.held and np.array_equal(numbers, np.rint(numbers)) else self.scale
 
     @cached_property
     def step(self) -> float:

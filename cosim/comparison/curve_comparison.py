@@ -170,7 +170,8 @@ class Task:
 
     Args:
         name: of the signal. unit: of both curves. reference, result: the curves. tolerance: for this signal.
-        length: of the reference [s]. curves: whether to keep what pictures need.
+        allowed: difference in value that it allows [unit]. length: of the reference [s].
+        curves: whether to keep what pictures need.
     """
 
     name: str
@@ -178,6 +179,7 @@ class Task:
     reference: Curve
     result: Curve
     tolerance: Tolerance
+    allowed: float
     length: float
     curves: bool = True
 
@@ -222,7 +224,7 @@ def _allowed_for(task: Task) -> Allowed:
     step = max(task.reference.step, task.result.step)
     window = max(_WINDOW_TOLERANCES * time, _WINDOW_STEPS * step, _WINDOW_SHARE * task.length, 1e-9)
     slack = rounding(task.reference.time[0], task.reference.time[-1]) if time > 0.0 else 0.0
-    return Allowed(task.tolerance.value_for(scale), time + slack, scale, window)
+    return Allowed(task.allowed, time + slack, scale, window)
 
 
 def _equal_curves(one: Curve, two: Curve) -> bool:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.comparison.curve import Curve
-from cosim.comparison.jumps import EQUAL_INSTANT, Jumps, choose, find_jumps, shifts
+from cosim.comparison.curve import EQUAL_INSTANT, Curve
+from cosim.comparison.jumps import Jumps, choose, find_jumps, shifts
 from cosim.comparison.tube import band_of, held_band, project, widen_at_ends
 
 _ROUNDED_TIME = 1e-2  # of the allowed time: a baseline rounds times to less than that
@@ -263,13 +263,15 @@ class _View:
         piece = np.searchsorted(rows[1], np.arange(len(coarse.time)))
         starts, ends = np.append(0, rows[0] + 1), np.append(rows[0] + 1, len(fine.time))
         if fine.held:
-            band = held_band(fine, self.tolerance, starts[piece], ends[piece])
+            late = float(np.max(-jumps.shift if self.swap else jumps.shift, initial=0.0))
+            band = held_band(fine, self.tolerance, starts[piece], ends[piece], late)
         else:
             begin = _from_event(fine, coarse, self.tolerance, starts[piece], ends[piece])
             where = coarse.time, self.tolerance, begin, ends[piece]
             band = widen_at_ends(band_of(fine, *where), fine, *where)
         evaluated = band.evaluated & self.usable
-        last = np.maximum(np.searchsorted(self.original.time, coarse.time, side="right") - 1, 0)
+        at = coarse.time + _ROUNDED_TIME * self.tolerance
+        last = np.maximum(np.searchsorted(self.original.time, at, side="right") - 1, 0)
         nearest = np.where(evaluated, np.clip(coarse.filled, band.low, band.high), self.original.values[last])
         error = np.where(evaluated, (nearest - coarse.values) if self.swap else (coarse.values - nearest), np.nan)
         one, two = (coarse.values, nearest) if self.swap else (nearest, coarse.values)

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from math import isfinite
 from typing import Any
 
+from cosim.comparison.curve import Curve
 from cosim.errors import ComparisonError, nearest
 
 
@@ -16,7 +17,8 @@ class Tolerance:
     """How far a signal may be from its reference.
 
     A value may differ by ``absolute + relative * range``, where range is largest minus smallest value of the reference,
-    at least a millionth of its largest size, and that size where it is constant; an instant by
+    at least a millionth of its largest size, and that size where it is constant; of whole numbers that are held it is
+    one at most, unless the tolerance is stated for the signal itself. An instant may differ by
     ``time + time_relative * length`` of the reference.
 
     Args:
@@ -115,6 +117,16 @@ class Tolerances:
         if name in self.by_signal:
             return self.by_signal[name]
         return next((stated for pattern, stated in self.by_signal.items() if fnmatchcase(name, pattern)), self.default)
+
+    def value_for(self, name: str, reference: Curve) -> float:
+        """Allowed difference in value of a signal, in its unit: a share of the range where the signal has a tolerance
+        of its own, else of `Curve.share_scale`.
+
+        Args:
+            name: name of the signal. reference: what it is held against.
+        """
+        stated = self.for_signal(name)
+        return stated.value_for(reference.share_scale if stated is self.default else reference.scale)
 
     def ignores(self, name: str) -> bool:
         """Whether a signal is not compared.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.comparison.curve import Curve
+from cosim.comparison.curve import EQUAL_INSTANT, Curve
 
 
 @dataclass(frozen=True)
@@ -83,14 +83,16 @@ def widen_at_ends(
     return _TubeBand(low, high, band.evaluated)
 
 
-def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarray) -> _TubeBand:
+def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarray, late: float = 0.0) -> _TubeBand:
     """Values of a held curve that are allowed for another on the same rows, all the time that a row holds.
 
     A row holds from its own time until that of the next. A value that comes one row late is right at the begin of the
-    row, within the allowed time, and wrong at its end; so the begin, the middle and the end are looked at.
+    row, within the allowed time, and wrong at its end; so the begin, the middle and the end are looked at. The last row
+    has no end: its value counts, unless a change there may come after it.
 
     Args:
         curve: the curve, on the rows of the other. tolerance: [s]. first, last: as in `band_of`, for each row.
+        late: how much later a change of the other is, where both have it [s].
     """
     time = curve.time
     until = np.append(time[1:], time[-1])
@@ -100,7 +102,16 @@ def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarra
     evaluated = np.stack([begin.evaluated, middle.evaluated & holds, end.evaluated & holds])
     low = np.max(np.where(evaluated, [begin.low, middle.low, end.low], -np.inf), axis=0)
     high = np.min(np.where(evaluated, [begin.high, middle.high, end.high], np.inf), axis=0)
+    if _is_apart(curve, max(tolerance, late)):
+        low[-1] = high[-1] = curve.filled[-1]
     return _TubeBand(np.minimum(low, high), high, np.asarray(evaluated.any(axis=0)))
+
+
+def _is_apart(curve: Curve, reach: float) -> bool:
+    """Whether the last row is further than `reach` [s] from those before it."""
+    end = float(curve.time[-1])
+    before = np.searchsorted(curve.time, end)
+    return before == 0 or bool(end - curve.time[before - 1] > reach + EQUAL_INSTANT * (1.0 + abs(end)))
 
 
 def _band_before(curve: Curve, until: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray) -> _TubeBand:
@@ -122,6 +133,8 @@ def project(curve: Curve, onto: Curve, tolerance: float) -> Curve:
     """
     band = band_of(curve, onto.time, tolerance)
     values = np.where(onto.finite & band.evaluated, np.clip(onto.filled, band.low, band.high), band.low)
+    if abs(onto.time[-1] - curve.time[-1]) <= tolerance and _is_apart(curve, tolerance):
+        values[-1] = curve.filled[-1]
     return Curve(onto.time, values, held=True)
 
 

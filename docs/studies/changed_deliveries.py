@@ -99,7 +99,7 @@ def held_against(baseline: Path, changed: Changed) -> Regression:
     with tempfile.TemporaryDirectory() as folder:
         fmu = deliver(changed.system(), changed.stated, Path(folder))
         kept = read_baseline(baseline)
-        return check(run_again(kept, fmu, warn=lambda _: None).result, kept, label=FILE)
+        return check(run_again(kept, fmu).result, kept, label=FILE)
 
 
 def section(changed: Changed, found: Regression) -> str:
