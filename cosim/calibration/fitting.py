@@ -13,7 +13,7 @@ from cosim.calibration.least_squares import Fit, NoSlopeError, fit
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
 from cosim.calibration.runs import Hidden, Runs, in_words
 from cosim.errors import nearest
-from fmus.tables.numbers import number
+from fmus.tables.numbers import instant, number
 from fmus.tables.table import Column, Parts, Readable, Table, name_column, text_column
 
 Array = NDArray[np.float64]
@@ -131,7 +131,7 @@ class Calibration(Readable):
     def parts(self) -> Parts:
         """Estimates, intervals, residuals and remarks for people."""
         time = self.recorded.time
-        span = f"from {number(float(time[0]), 5)} to {number(float(time[-1]), 5)} s"
+        span = f"from {instant(float(time[0]))} to {instant(float(time[-1]))} s"
         head = f"{len(time)} samples {span}, {self.fit.runs} runs, condition number {number(self.fit.condition, 2)}"
         notes = [*(f"- Not identified: {hidden.text}" for hidden in self.hidden), *(f"- {r}" for r in self.remarks)]
         return [head, self.parameters(), self.signals(), *(["\n".join(notes)] if notes else [])]

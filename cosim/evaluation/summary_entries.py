@@ -14,7 +14,7 @@ from math import isfinite
 from typing import Any
 
 from cosim.results.result import Result
-from fmus.tables.numbers import number
+from fmus.tables.numbers import instant, number
 
 
 def mapping_entry(result: Result, key: str) -> Mapping[str, Any]:
@@ -95,7 +95,7 @@ def statement(result: Result) -> str:
         factor = duration / wall
     scenario = result.summary.get("scenario")
     text = f"Scenario {scenario}" if isinstance(scenario, str) else "This run"
-    text += f" covers {number(duration)} s of simulated time"
+    text += f" covers {instant(duration)} s of simulated time"
     text += f" in communication steps of {number(1000 * step)} ms" if step is not None else ""
     text += f"; it took {number(wall)} s of wall time" if wall is not None else ""
     text += f", {number(factor)} times as fast as real time" if factor is not None else ""

@@ -25,6 +25,17 @@ def number(value: object, digits: int = 3) -> str:
     return _finite(float(value), digits)
 
 
+def instant(value: object) -> str:
+    """An instant to the millisecond, as long as a run may be: 1003.25.
+
+    Args:
+        value: [s]; None and NaN give a dash.
+    """
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return number(value)
+    return f"{round(value, 3) + 0.0:.3f}".rstrip("0").rstrip(".")
+
+
 def _finite(value: float, digits: int) -> str:
     if value == 0:
         return "0"

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmus.tables.notebook import paragraph_html
-from fmus.tables.numbers import DASH
+from fmus.tables.numbers import DASH, instant
 from fmus.tables.table import Column, Table, error_column, name_column, pairs_table, text_column
 from fmus.tables.terminal import paragraph
 
@@ -165,3 +165,22 @@ def test_of_a_paragraph_only_a_word_that_is_longer_than_a_line_stands_out() -> N
     lines = paragraph(f"- written to {path} just now, as was asked for by whoever typed the command", 40)
     assert [line.strip() for line in lines if len(line) > 40] == [path]
     assert paragraph("a\nb", None) == ["a", "b"]
+
+
+@given(st.floats(-1e7, 1e7))
+def test_an_instant_is_written_to_the_millisecond_however_long_the_run(time: float) -> None:
+    text = instant(time)
+    assert abs(float(text) - time) <= 5.1e-4
+    assert "e" not in text
+    assert not text.startswith("-0") or float(text) != 0.0
+    assert "." not in text or text[-1] not in "0."
+
+
+def test_an_instant_that_is_none_is_a_dash() -> None:
+    assert [instant(value) for value in (None, float("nan"), 1003.0, 3605.25, 0.0)] == [
+        "–",
+        "–",
+        "1003",
+        "3605.25",
+        "0",
+    ]

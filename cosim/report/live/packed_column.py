@@ -116,6 +116,7 @@ def _steps(values: np.ndarray, low: float, high: float) -> int:
 
 def _grid_fits(values: np.ndarray, low: float, high: float, steps: int) -> bool:
     """Whether a step of the grid is small beside the middle half of the values, too: one that diverged would hide it.
+    Of a signal that mostly rests, it is held against what it does when it does not.
 
     Args:
         values: all finite. low, high: their ends. steps: between these.
@@ -125,7 +126,10 @@ def _grid_fits(values: np.ndarray, low: float, high: float, steps: int) -> bool:
     if max(abs(low), abs(high)) > _LARGEST:
         return False
     middle = float(np.subtract(*np.percentile(values, (75, 25))))
-    return middle == 0.0 or (high - low) / steps <= _SHARE * middle
+    if middle == 0.0:
+        moves = np.abs(values - np.median(values))
+        middle = float(np.percentile(moves[moves > 0.0], 25))
+    return (high - low) / steps <= _SHARE * middle
 
 
 def _on_grid(values: np.ndarray, low: float, high: float, steps: int) -> np.ndarray:

@@ -14,7 +14,7 @@ from cosim.evaluation.summary_entries import list_entry, mapping_entry, number_e
 from cosim.report.live.live_page import Card
 from cosim.report.page.run_verdict import ObserverStatus
 from cosim.results.result import Result
-from fmus.tables.numbers import DASH, error_number, number
+from fmus.tables.numbers import DASH, error_number, instant
 
 
 def run_statements(result: Result, spec: ReportSpec, statuses: Sequence[ObserverStatus]) -> list[Card]:
@@ -30,10 +30,10 @@ def run_statements(result: Result, spec: ReportSpec, statuses: Sequence[Observer
 
 
 def _ending(result: Result) -> Card:
-    reached = number(float(result.time[-1])) if len(result.time) else "0"
+    reached = instant(float(result.time[-1])) if len(result.time) else "0"
     if result.failure:
         stop = number_entry(result.summary, "stop")
-        return "Run", "ended early", f"at {reached} s" + (f" of {number(stop)} s" if stop is not None else ""), "bad"
+        return "Run", "ended early", f"at {reached} s" + (f" of {instant(stop)} s" if stop is not None else ""), "bad"
     return "Run", "complete", f"to {reached} s", "good"
 
 

@@ -23,7 +23,7 @@ from cosim.report.live.first_sentence import first_sentence
 from cosim.report.live.live_page import Mark, PageVerdict
 from cosim.report.page.run_curves import QUANTITIES
 from cosim.results.result import Result
-from fmus.tables.numbers import number
+from fmus.tables.numbers import instant, number
 
 _CAUSES = ("fault", "zone", "telegram problem", "failure", "message")
 """Kinds of marks that may be why an error is large."""
@@ -94,10 +94,10 @@ def run_verdict(
     Args:
         result: the run. spec: roles. evaluated: expectations. statuses: from `observer_statuses`.
     """
-    reached = number(float(result.time[-1])) if len(result.time) else "0"
+    reached = instant(float(result.time[-1])) if len(result.time) else "0"
     if result.failure is not None:
         stop = number_entry(result.summary, "stop")
-        end = f"at {reached} s" + (f" of {number(stop)} s" if stop is not None else "")
+        end = f"at {reached} s" + (f" of {instant(stop)} s" if stop is not None else "")
         return PageVerdict(f"The run ended early, {end}: {first_sentence(result.failure)[0]}", "bad")
     unmet = [one for one in evaluated if not one.passed]
     speed = recorded(result, spec.true_speed)
@@ -186,7 +186,7 @@ def largest_finding(result: Result, spec: ReportSpec, statuses: Sequence[Observe
             return ""
         lost = (result.time >= spec.evaluate_after) & ~(np.abs(error) <= largest_tolerable(result, spec))
         time = float(result.time[int(np.argmax(lost))])
-        what = f"{label(spec, worst.name)} is off by more than the speed of the train from {number(time, 4)} s on"
+        what = f"{label(spec, worst.name)} is off by more than the speed of the train from {instant(time)} s on"
         return _with_causes(what, time, worst.name, result, marks)
     panel = "Position error" if any(not isnan(s.position) for s in statuses) else "Speed error"
     largest = [m for m in marks if m.kind == "worst" and m.panel == panel and m.value is not None]
@@ -194,7 +194,7 @@ def largest_finding(result: Result, spec: ReportSpec, statuses: Sequence[Observe
         return ""
     mark = max(largest, key=lambda m: abs(m.value or 0.0))
     name = next(s.name for s in statuses if mark.text.startswith(f"largest {panel.lower()} of {label(spec, s.name)}:"))
-    text = f"{mark.text[0].upper()}{mark.text[1:]}, at {number(mark.start, 4)} s"
+    text = f"{mark.text[0].upper()}{mark.text[1:]}, at {instant(mark.start)} s"
     return _with_causes(text, mark.start, name, result, marks)
 
 
@@ -215,8 +215,8 @@ def _causes(time: float, observer: str, result: Result, marks: Sequence[Mark]) -
         if m.kind in _CAUSES and m.start <= time <= (m.end if m.end is not None else m.start + _BEFORE * usual)
     ]
     for mark in {m.kind: m for m in near}.values():  # the last of each kind
-        until = f" to {number(mark.end, 4)} s" if mark.end is not None else " s"
-        yield f"{mark.text} ({number(mark.start, 4)}{until})"
+        until = f" to {instant(mark.end)} s" if mark.end is not None else " s"
+        yield f"{mark.text} ({instant(mark.start)}{until})"
     before = stamps[stamps < time]
     if len(before) and usual and time - before[-1] > _LONG_GAP * usual:
         yield f"the last telegram it used was {number(time - float(before[-1]))} s before, {number(usual)} s are usual"
@@ -236,7 +236,7 @@ def _changes(time: float, marks: Sequence[Mark]) -> Iterator[str]:
 
 
 def _span(mark: Mark) -> str:
-    return f"{number(mark.start, 4)} to {number(mark.end or 0.0, 4)} s"
+    return f"{instant(mark.start)} to {instant(mark.end or 0.0)} s"
 
 
 def _telegram_then(time: float, result: Result, marks: Sequence[Mark]) -> Iterator[str]:

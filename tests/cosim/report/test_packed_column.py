@@ -80,6 +80,15 @@ def test_a_signal_that_diverged_keeps_what_it_was_before() -> None:
     np.testing.assert_allclose(decoded(column), values, rtol=2.0**-21)
 
 
+@pytest.mark.parametrize("every", [2, 4, 10, 100])
+def test_a_signal_that_mostly_rests_keeps_what_it_does_beside_one_large_value(every: int) -> None:
+    """A residual or a slip: zero, except at some rows, and one outlier."""
+    values = np.zeros(2000)
+    values[::every] = 0.3 * np.sin(np.arange(0, 2000, every) + 1.0)
+    values[1001] = 1e9
+    np.testing.assert_allclose(decoded(pack(values)), values, rtol=1e-6)
+
+
 @given(st.lists(st.floats(0.0, 1e4), min_size=1, max_size=60))
 def test_instants_never_fall_and_equal_ones_stay_equal(listed: list[float]) -> None:
     time = np.sort(np.array(listed))
