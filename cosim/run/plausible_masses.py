@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any
 
 from cosim.components.component import Component
 from cosim.components.start_values import declared_start
 from cosim.scenario.scenario_tables import ComponentTable
+from fmus.fmi.units import Units
 from plant_models.hybrid.units import Unit, UnitError, parse_unit
 
 LIGHTEST = 1000.0
@@ -17,6 +19,9 @@ HEAVIEST = 1e8
 """No train weighs more [kg]; the heaviest that ever ran had as many tonnes."""
 APART = 200.0
 """From this ratio on, two masses are not those of one train: a trailing load is less, a thousand is a wrong unit."""
+_TOO_HEAVY = 500.0
+"""From this ratio to what a component declares on, a mass is in a unit that is a thousand times less."""
+_THOUSAND = 1000.0
 _MASS, _FORCE = parse_unit("kg"), parse_unit("N")
 _WHOLE = "mass"
 """Name of the parameter by which models of trains, which are driven by a force, know their mass."""
@@ -30,6 +35,7 @@ class _Mass:
 
     Args:
         name: ``component.parameter``. value: in use [kg]. declared: by the component [kg], None where nothing is.
+        unit: in which it is stated, a name. factor: kilograms in it.
         stated: whether the scenario sets it. of_train: whether it is that of a whole train or what an observer
             takes for it.
     """
@@ -37,8 +43,15 @@ class _Mass:
     name: str
     value: float
     declared: float | None
+    unit: str
+    factor: float
     stated: bool
     of_train: bool
+
+    @property
+    def text(self) -> str:
+        """As it is stated, with its unit."""
+        return f"{self.value / self.factor:g} {self.unit}"
 
 
 def mass_warnings(tables: Mapping[str, ComponentTable], components: Mapping[str, Component]) -> list[str]:
@@ -64,27 +77,45 @@ def _beside(mass: _Mass, other: _Mass) -> str:
     component, _, parameter = mass.name.partition(".")
     how = "" if mass.stated else ", its default"
     return (
-        f"{mass.name} is {mass.value:g} kg{how}, beside {other.name} = {other.value:g} kg; where both are of one train "
-        f"write {parameter} = {other.value:g} in [components.{component}.parameters]."
+        f"{mass.name} is {mass.text}{how}, beside {other.name} = {other.text}; where both are of one train "
+        f"write {parameter} = {other.value / mass.factor:g} in [components.{component}.parameters]."
     )
 
 
 def _alone(mass: _Mass) -> str:
-    """What is doubtful about a mass that the scenario states, or an empty text."""
-    train = mass.of_train or (mass.declared or 0.0) >= LIGHTEST
-    if not mass.stated or not train or mass.value == _PER_UNIT_MASS:
+    """What is doubtful about one mass, or an empty text."""
+    train = mass.of_train or (mass.stated and (mass.declared or 0.0) >= LIGHTEST)
+    if not train or mass.value == _PER_UNIT_MASS:
         return ""
-    light = 0.0 < mass.value < LIGHTEST
-    if light and mass.declared is not None and mass.declared >= LIGHTEST:
-        light = mass.value * APART <= mass.declared
-    if light:
+    how = f"= {mass.text}" if mass.stated else f"is {mass.text}, its default, which"
+    if _is_light(mass):
+        number, meant = mass.value / mass.factor, ("t", 1e3) if mass.factor < _THOUSAND else ("1000 t", 1e6)
         return (
-            f"{mass.name} = {mass.value:g} kg is no mass of a train; it is stated in kilograms: for {mass.value:g} t "
-            f"write {1e3 * mass.value:g}."
+            f"{mass.name} {how} is no mass of a train; it is stated in {_unit_text(mass)}: for {number:g} {meant[0]} "
+            f"write {number * meant[1] / mass.factor:g}."
         )
-    if mass.value > HEAVIEST:
-        return f"{mass.name} = {mass.value:g} kg is no mass of a train; it is stated in kilograms, not in grams."
+    if _is_heavy(mass):
+        smaller = "kilograms" if mass.factor >= _THOUSAND else "grams"
+        return f"{mass.name} {how} is no mass of a train; it is stated in {_unit_text(mass)}, not in {smaller}."
     return ""
+
+
+def _unit_text(mass: _Mass) -> str:
+    return {"kg": "kilograms", "t": "tonnes"}.get(mass.unit, mass.unit)
+
+
+def _is_light(mass: _Mass) -> bool:
+    """Whether it is lighter than a rail vehicle, and nearer to what is declared once it is taken a thousand times."""
+    if not 0.0 < mass.value < LIGHTEST:
+        return False
+    declared = mass.declared or 0.0
+    return not mass.stated or declared < LIGHTEST or mass.value * sqrt(_THOUSAND) < declared
+
+
+def _is_heavy(mass: _Mass) -> bool:
+    """Whether it is heavier than a train, or a thousand times as heavy as what is declared."""
+    declared = mass.declared or 0.0
+    return mass.value > HEAVIEST or (declared >= LIGHTEST and mass.value >= _TOO_HEAVY * declared)
 
 
 def _masses(component: Component, parameters: Mapping[str, Any]) -> Iterator[_Mass]:
@@ -96,7 +127,8 @@ def _masses(component: Component, parameters: Mapping[str, Any]) -> Iterator[_Ma
         if unit is not None and isinstance(value, int | float) and not isinstance(value, bool):
             known = declared * unit.factor if isinstance(declared, int | float) else None
             driven = name == _WHOLE and any(_has_unit(component, i, _FORCE) for i in component.names("input"))
-            yield _Mass(f"{component.name}.{name}", value * unit.factor, known, name in parameters, driven)
+            stated, named_unit = name in parameters, Units.name(component.variables[name]) or "kg"
+            yield _Mass(f"{component.name}.{name}", value * unit.factor, known, named_unit, unit.factor, stated, driven)
 
 
 def _has_unit(component: Component, name: str, meant: Unit) -> bool:

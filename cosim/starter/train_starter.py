@@ -6,6 +6,7 @@ from collections.abc import Set
 from typing import Any
 
 from cosim.run.component_models import make_declared
+from cosim.run.plausible_masses import LIGHTEST
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import step_count
 from cosim.starter.guessed_signal import Guess, fits, in_si
@@ -99,11 +100,10 @@ def _mass(roles: PlantRoles) -> tuple[str, float, str]:
     signal = roles.mass.signal if roles.mass is not None else None
     if roles.mass is None or signal is None or not signal.start or signal.start < 0.0:
         return "mass", USUAL_MASS, "[kg] WRITE THE MASS OF YOUR TRAIN: the FMU has no parameter that looks like it"
-    return (
-        "mass",
-        in_si(signal),
-        f"[kg] start value of {one_line(signal.name)}; {guessed(roles.mass).removeprefix('  # ')}",
-    )
+    value, source = in_si(signal), f"start value of {one_line(signal.name)}"
+    if value < LIGHTEST:
+        return "mass", value, f"[kg] {source}, NO MASS OF A TRAIN: where tonnes are meant write {1e3 * value:g}"
+    return "mass", value, f"[kg] {source}; {guessed(roles.mass).removeprefix('  # ')}"
 
 
 def declared_observer(name: str) -> Any:

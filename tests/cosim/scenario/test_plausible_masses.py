@@ -37,10 +37,58 @@ def warnings(**parts: dict[str, Any]) -> list[str]:
 @given(tonnes=st.floats(10.0, 999.0))
 def test_tonnes_in_place_of_kilograms_are_named_and_kilograms_are_not(model: str, tonnes: float) -> None:
     wrong = warnings(train={"model": model, "parameters": {"mass": tonnes}})
-    declared = 90e3 if model != "longitudinal_train" else None
-    if declared is None or tonnes * 200.0 <= declared:
-        assert [f"for {tonnes:g} t write {1e3 * tonnes:g}" in text for text in wrong] == [True]
+    assert [f"for {tonnes:g} t write {1e3 * tonnes:g}" in text for text in wrong] == [True]
     assert warnings(train={"model": model, "parameters": {"mass": 1e3 * tonnes}}) == []
+
+
+@cache
+def vendors(unit: str, start: float) -> Component:
+    """A locomotive whose mass a vendor states in another unit."""
+    component = describe_component("train", ComponentTable.model_validate({"model": "locomotive"}), Path(), "test")
+    component.variables["mass"].unit, component.variables["mass"].start = unit, str(start)
+    return component
+
+
+@given(tonnes=st.floats(10.0, 999.0))
+def test_kilograms_in_place_of_tonnes_are_named_and_tonnes_are_not(tonnes: float) -> None:
+    """Of an FMU that declares 90 t; what is named is what was typed."""
+
+    def of(value: float) -> list[str]:
+        table = ComponentTable.model_validate({"model": "locomotive", "parameters": {"mass": value}})
+        return mass_warnings({"train": table}, {"train": vendors("t", 90.0)})
+
+    assert of(tonnes) == []
+    heavy = of(1e3 * tonnes)
+    assert bool(heavy) == (tonnes >= 45.0)
+    assert all(f"train.mass = {1e3 * tonnes:g} t is no mass of a train" in text for text in heavy)
+    assert all("stated in tonnes, not in kilograms" in text for text in heavy)
+    (light,) = of(1e-3 * tonnes)
+    assert f"train.mass = {1e-3 * tonnes:g} t is no mass" in light
+    assert f"write {tonnes:g}." in light
+
+
+def test_a_default_that_is_no_mass_of_a_train_is_named() -> None:
+    """A vendor who declares 90 kg and means tonnes."""
+    table = ComponentTable.model_validate({"model": "locomotive"})
+    (text,) = mass_warnings({"train": table}, {"train": vendors("kg", 90.0)})
+    assert text.startswith("train.mass is 90 kg, its default, which is no mass of a train; ")
+    assert "for 90 t write 90000" in text
+    assert mass_warnings({"train": table}, {"train": vendors("t", 90.0)}) == []
+
+
+@given(mass=st.floats(500.0, 999.0))
+def test_a_small_vehicle_that_is_declared_as_one_is_right(mass: float) -> None:
+    table = ComponentTable.model_validate({"model": "locomotive", "parameters": {"mass": mass}})
+    assert mass_warnings({"train": table}, {"train": vendors("kg", 1200.0)}) == []
+
+
+def test_the_mass_beside_another_is_stated_in_its_own_unit() -> None:
+    table = ComponentTable.model_validate({"model": "locomotive"})
+    tables = {"train": table, "observer": ComponentTable.model_validate({"observer": "quasi_lpv_uio"})}
+    components = {"train": vendors("t", 90.0), "observer": described("observer", "observer", "quasi_lpv_uio")}
+    (text,) = mass_warnings(tables, components)
+    assert text.startswith("observer.mass is 1 kg, its default, beside train.mass = 90 t; ")
+    assert "write mass = 90000 in [components.observer" in text
 
 
 def test_an_observer_that_takes_the_train_for_one_kilogram_is_named() -> None:

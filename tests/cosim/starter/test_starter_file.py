@@ -230,6 +230,13 @@ def test_the_mass_is_taken_from_the_fmu_in_kg(tmp_path: Path) -> None:
     assert (observer.observer, observer.parameters["mass"]) == ("discrete_uio", 420e3)
 
 
+def test_a_mass_that_is_none_of_a_train_is_named_where_it_is_written(tmp_path: Path) -> None:
+    mass = Variable("Masse", 4, "parameter", start=90.0, unit="kg")
+    parts = [into("F", 1, "N"), out("s", 2, "m"), out("v", 3, "m/s"), mass]
+    made = write_starter(described(tmp_path, *parts), tmp_path / "mine.toml")
+    assert "NO MASS OF A TRAIN: where tonnes are meant write 90000" in made.text
+
+
 def test_the_step_is_the_fmus_own(tmp_path: Path) -> None:
     parts = [into("F", 1, "N"), out("s", 2, "m"), out("v", 3, "m/s")]
     fmu = described(tmp_path, *parts, edit=('stopTime="1.0"', 'stopTime="1.0" stepSize="0.07"'))
