@@ -34,9 +34,9 @@ def finding(*stamps: float, zone: float | None = None, phase: float | None = Non
 
 def test_a_telegram_at_the_instant_a_zone_that_ended_and_a_phase_that_began_are_named() -> None:
     said = finding(3.0, 12.03, zone=11.0, phase=10.5)
-    assert "at 12.00 s: " in said
-    assert "low adhesion until 1.00 s before (0 to 11.00 s)" in said
-    assert "phase second began 1.50 s before (10.50 to 20.00 s)" in said
+    assert "at 12 s: " in said
+    assert "low adhesion until 1.00 s before (0 to 11 s)" in said
+    assert "phase second began 1.50 s before (10.5 to 20 s)" in said
     assert "balise I1 at 0 m, at that instant" in said
 
 

@@ -291,7 +291,7 @@ def test_page_is_well_formed_and_says_what_was_run(result: Result) -> None:
     assert len(page.all("h1")) == 1
     assert all(attrs.get("scope") for attrs in page.all("th"))
     for words in (
-        "Scenario adhesion_zones covers 90.0 s of simulated time in communication steps of 10.0 ms",
+        "Scenario adhesion_zones covers 90 s of simulated time in communication steps of 10.0 ms",
         "72.9 times as fast as real time",  # 90 s in 1.234 s
         "located by 'rollback': redone steps are bit-identical.",
         "gaps up to 1.1 s exceed the certified 0.286 s",
