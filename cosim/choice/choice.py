@@ -18,6 +18,7 @@ from cosim.choice.playback import connection
 from cosim.choice.ranking import Row
 from cosim.errors import RunError
 from cosim.report.page.observer_page import Answer, write_benchmark
+from cosim.report.page.picture_files import Pictures
 from cosim.simulation.scenario import Scenario
 from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
@@ -161,11 +162,12 @@ class Choice(Readable):
             "benchmark": self.benchmark.to_data(),
         }
 
-    def write(self, directory: str | Path) -> dict[str, Path]:
+    def write(self, directory: str | Path, *, figures: Pictures = False) -> dict[str, Path]:
         """Write page and data to a folder.
 
         Args:
             directory: the folder; created where it does not exist.
+            figures: whether to draw those of the nominal run as well: True or ``"png"``, or ``"svg"``.
 
         Raises:
             OutputError: the folder cannot be written.
@@ -173,7 +175,9 @@ class Choice(Readable):
         labels = {PLAIN, *(row.score.label for row in self.rows[:_SHOWN])}
         shown = replace(self.benchmark, scores=tuple(s for s in self.benchmark.scores if s.label in labels))
         good = self.found and self.best.safe
-        return write_benchmark(shown, directory, Answer(self.answer, good, self.tables(), self.to_data()))
+        return write_benchmark(
+            shown, directory, Answer(self.answer, good, self.tables(), self.to_data()), figures=figures
+        )
 
     def _first(self) -> str:
         plain = next((row for row in self.rows if row.candidate.model == PLAIN and row.tried), None)

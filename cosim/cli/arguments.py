@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
+from cosim.report.page.picture_files import PictureKind
 from fmus.cli.commands import Argument, argument
 from fmus.cli.parsers import no_number
 
@@ -13,6 +14,22 @@ _DEFAULT_SCENARIO = "freight_profile_d"
 OVERRIDES = (
     "override component.parameter, master.KEY, balises.KEY, report.KEY, a top-level key, or case; may be repeated; the "
     "others win over case"
+)
+
+
+def _picture_kind(text: str) -> str:
+    if text not in get_args(PictureKind):
+        raise argparse.ArgumentTypeError(f"expected png or svg (got {text!r}); without a kind it stands last")
+    return text
+
+
+FIGURE_FILES = argument(
+    "--figures",
+    nargs="?",
+    const="png",
+    type=_picture_kind,
+    metavar="KIND",
+    help="draw figures as files, too, in figures beside the page: png (default) or svg",
 )
 QUIET = argument("--quiet", action="store_true", help="no progress bar")
 PARAMETERS_FILE = argument("--toml", type=Path, metavar="FILE", help="write the parameters for a scenario")

@@ -17,7 +17,7 @@ from cosim.baselines.references import embed_baseline, find_references, read_ref
 from cosim.baselines.references.extract import extract_reference
 from cosim.baselines.subject import Subject, make_subject, run_again
 from cosim.baselines.update import plan_update
-from cosim.cli.arguments import OVERRIDES, QUIET, settings_argument
+from cosim.cli.arguments import FIGURE_FILES, OVERRIDES, QUIET, settings_argument
 from cosim.cli.scenarios import between_samples, parse_setting, simulated_time_bar
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
 from cosim.comparison.compare import curve_of
@@ -25,6 +25,7 @@ from cosim.comparison.comparison_text import comparison_parts, comparison_verdic
 from cosim.comparison.tolerance import Tolerances
 from cosim.components.description import read_description
 from cosim.errors import BaselineError, OutputError
+from cosim.report.page.picture_files import Pictures
 from cosim.results.load_result import load_result
 from fmus.cli.commands import Action, Actions, Argument, ArgumentGroup, Execute, argument
 from fmus.cli.output import Output
@@ -70,6 +71,7 @@ CHECK = (
     argument("--against", metavar="FMU_OR_RESULT", help="another FMU to run, or a results folder or table to compare"),
     argument("--reference", metavar="NAME", help="of several references in an FMU: this one only"),
     argument("--plots", metavar="DIR", help="write a page and pictures of what differs to this folder"),
+    FIGURE_FILES,
     argument("--verbose", action="store_true", help="print all signals and everything that was found"),
     ALLOWED,
 )
@@ -146,7 +148,8 @@ def _check(options: argparse.Namespace) -> Output:
         verdict = _of_several(found)
     output = Output(parts, data, verdict=verdict)
     output = output if all(one.equal for one in found) else replace(output, code=DIFFERS, role="bad")
-    return output if options.plots is None else _drawn(output, found, Path(options.plots))
+    folder = options.plots or ("." if options.figures else None)
+    return output if folder is None else _drawn(output, found, Path(folder), options.figures or True)
 
 
 def _of_several(found: Sequence[Regression]) -> str:
@@ -176,7 +179,7 @@ def _check_one(baseline: Baseline, asked: Asked, options: argparse.Namespace) ->
     )
 
 
-def _drawn(output: Output, found: Sequence[Regression], folder: Path) -> Output:
+def _drawn(output: Output, found: Sequence[Regression], folder: Path, figures: Pictures) -> Output:
     """The same with the pages; what was found is kept where one cannot be written."""
     from cosim.report.page.comparison import write_comparison  # noqa: PLC0415 - only for those who write
 
@@ -184,7 +187,7 @@ def _drawn(output: Output, found: Sequence[Regression], folder: Path) -> Output:
     try:
         for one in found:
             several = len(found) > 1
-            paths = write_comparison(one, folder / one.reference if several else folder, pictures=True)
+            paths = write_comparison(one, folder / one.reference if several else folder, pictures=figures)
             files |= {f"{kind} of {one.reference}" if several else kind: path for kind, path in paths.items()}
     except OutputError as error:
         return replace(output, files=files, error=error)

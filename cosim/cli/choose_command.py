@@ -10,7 +10,7 @@ from typing import Any
 from cosim.choice.allowance import Allowance
 from cosim.choice.choice import INTERRUPTED, Choice
 from cosim.choice.choose import SEEDS, choose, scenario_for_fmu
-from cosim.cli.arguments import QUIET, settings_argument
+from cosim.cli.arguments import FIGURE_FILES, QUIET, settings_argument
 from cosim.cli.scenarios import load_scenario
 from cosim.errors import OutputError, RunError
 from cosim.results.results_folder import check_writable
@@ -67,6 +67,7 @@ ARGUMENTS = (
     argument("--write", type=Path, metavar="FILE", help="write the scenario with the observer in it"),
     argument("--force", action="store_true", help="replace the file of --write where it exists"),
     argument("--out", metavar="DIR", help="also write page and data to this folder"),
+    FIGURE_FILES,
     QUIET,
 )
 
@@ -76,6 +77,8 @@ def execute(options: argparse.Namespace) -> Output:
     demand_casadi()  # hundreds of runs in plain NumPy would take hours
     if options.write is not None and options.write.exists() and not options.force:
         raise OutputError(f"{options.write} exists already; choose another name, or replace it with --force.")
+    if options.figures and options.out is None:
+        raise OutputError("--figures draws beside the page: say with --out DIR where that is to go.")
     for folder in (options.out, options.record):
         if folder is not None:
             check_writable(folder)
@@ -85,7 +88,7 @@ def execute(options: argparse.Namespace) -> Output:
     if options.write is not None and choice.found and not choice.stopped:
         files["scenario"] = choice.with_best().save(options.write)
     if options.out is not None:
-        files |= choice.write(options.out)
+        files |= choice.write(options.out, figures=options.figures)
     return Output(choice.parts(), choice.to_data(), files, error=_error(choice))
 
 

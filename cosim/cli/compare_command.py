@@ -8,15 +8,19 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.baselines import check, is_baseline, read_baseline
+from cosim.cli.arguments import FIGURE_FILES
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
 from cosim.comparison.compare import compare_results
 from cosim.comparison.comparison_text import comparison_verdict, difference_parts
 from cosim.comparison.tolerance import Tolerances
 from cosim.errors import ComparisonError, OutputError, nearest
+from cosim.report.page.picture_files import picture_kind, write_numbered
 from cosim.results.load_result import load_result
+from cosim.results.results_folder import FIGURES
 from fmus.cli.commands import ArgumentGroup, argument, one_of
 from fmus.cli.output import Output
 
@@ -69,7 +73,8 @@ ARGUMENTS = (
             argument(
                 "--html", metavar="FILE", help="write a page to explore both sides, the tolerance and what differs"
             ),
-            argument("--plots", metavar="DIR", help="draw the signals that differ as PNG files"),
+            argument("--plots", metavar="DIR", help="draw the signals that differ to this folder"),
+            FIGURE_FILES,
             one_of(
                 argument("--quiet", action="store_true", help="print the verdict only"),
                 argument("--verbose", action="store_true", help="print all signals and everything that was found"),
@@ -87,7 +92,14 @@ def execute(options: argparse.Namespace) -> Output:
     parts = [] if options.quiet else difference_parts(comparison, verbose=options.verbose)
     found = Output(parts, comparison.to_dict(), verdict=comparison_verdict(comparison))
     found = found if comparison.equal else replace(found, code=_DIFFERENT, role="bad")
-    return _drawn(found, comparison, options) if options.html or options.plots else found
+    return _drawn(found, comparison, options) if options.html or _pictures(options) else found
+
+
+def _pictures(options: argparse.Namespace) -> Path | None:
+    """Folder for pictures, where they are asked for: that of ``--plots``, or ``figures`` beside the page."""
+    if options.plots:
+        return Path(options.plots)
+    return Path(options.html or "").parent / FIGURES if options.figures else None
 
 
 def _compare(options: argparse.Namespace, asked: Asked) -> Comparison:
@@ -104,7 +116,7 @@ def _compare(options: argparse.Namespace, asked: Asked) -> Comparison:
     if baseline is not None:
         regression = check(result, replace(baseline, result=reference), tolerances, label=options.result)
         return replace(regression, reference=options.reference, notes=[*regression.notes, *odd])
-    drawn = bool(options.html or options.plots)
+    drawn = bool(options.html or _pictures(options))
     found = compare_results(reference, result, tolerances, labels=(options.reference, options.result), curves=drawn)
     return replace(found, notes=[*odd, *found.notes])
 
@@ -143,18 +155,15 @@ def _columns(side: Result, names: Sequence[str]) -> Result:
 
 def _drawn(found: Output, comparison: Comparison, options: argparse.Namespace) -> Output:
     """The same with page and pictures, as they were asked for; what was found is kept where one cannot be written."""
-    from cosim.report.page.comparison import (  # noqa: PLC0415 - only for those who write
-        draw_pictures,
-        write_page,
-        write_pictures,
-    )
+    from cosim.report.page.comparison import draw_pictures, write_page  # noqa: PLC0415 - only for those who write
 
     try:
         files = {"page": write_page(comparison, options.html)} if options.html else {}
-        drawn = write_pictures(draw_pictures(comparison), options.plots) if options.plots else {}
+        folder, kind = _pictures(options), picture_kind(options.figures or True)
+        drawn = write_numbered(draw_pictures(comparison, kind), folder, kind) if folder is not None else {}
     except OutputError as error:
         return replace(found, error=error)
-    none = ["no pictures: nothing that differs can be drawn"] if options.plots and not drawn else []
+    none = ["no pictures: nothing that differs can be drawn"] if _pictures(options) and not drawn else []
     if options.quiet:
         return found
     files |= {f"picture of {name}": path for name, path in drawn.items()}

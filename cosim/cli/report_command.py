@@ -9,6 +9,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cosim.cli.arguments import FIGURE_FILES
 from cosim.errors import ComparisonError, nearest
 from cosim.evaluation.stored_spec import is_guessed, spec_of
 from cosim.report.overlay.overlaid_runs import make_runs
@@ -45,7 +46,7 @@ ARGUMENTS = (
     argument("--out", metavar="FILE.html", help=f"the page (default: report.html in DIR, or {OVERLAY} for several)"),
     argument("--labels", metavar="A,B", help="texts for the runs, separated by commas (default: names of the folders)"),
     repeated("--signals", "PATTERN", "for several runs: recorded signals to draw as well, e.g. 'train.*'"),
-    argument("--figures", action="store_true", help="draw the figures as PNG files, too, in figures beside the page"),
+    FIGURE_FILES,
 )
 
 

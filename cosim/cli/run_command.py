@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim import studies
-from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
+from cosim.cli.arguments import FIGURE_FILES, MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
 from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import load_scenario, simulated_time_bar
 from cosim.errors import OutputError
@@ -74,7 +74,7 @@ ARGUMENTS = (
     ),
     *MANY_RUNS,
     argument("--no-report", action="store_true", help="write result files only"),
-    argument("--figures", action="store_true", help="draw the figures of the report as PNG files, too"),
+    FIGURE_FILES,
     argument(
         "--strict", action="store_true", help="refuse an SSP of wrong form; exit with 1 when the run gave warnings"
     ),

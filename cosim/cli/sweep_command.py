@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from cosim import studies
-from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, scenario_arguments
+from cosim.cli.arguments import FIGURE_FILES, MANY_RUNS, QUIET, many_runs, scenario_arguments
 from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError, nearest
-from cosim.results.results_folder import check_writable
+from cosim.results.results_folder import FIGURES, check_writable
 from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
 from cosim.studies.sampling_plans import MOST, Range, uniform
 from cosim.studies.sweep import Sweep
-from cosim.studies.sweep_files import PAGE
+from cosim.studies.sweep_files import PAGE, write_figures
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
@@ -60,6 +60,7 @@ ARGUMENTS = (
     argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)"),
     argument("--table-only", action="store_true", help="keep the table, and no results folder for each run"),
     *MANY_RUNS,
+    FIGURE_FILES,
     QUIET,
 )
 
@@ -85,7 +86,8 @@ def execute(options: argparse.Namespace) -> Output:
     unmet = f", {result.unmet}" if result.unmet else ""
     ending = f"{len(result) - len(result.failed)} of {len(result)} runs done{unmet}: {directory}"
     data = json.loads((directory / "index.json").read_text(encoding="utf-8"))
-    files = {"page": directory / PAGE}
+    drawn = write_figures(result, directory, options.figures)
+    files = {"page": directory / PAGE} | ({"figures": directory / FIGURES} if drawn else {})
     if result.failed:
         return Output([table], data, files, code=_SOME_FAILED, verdict=ending, role="bad")
     return Output([table], data, files, verdict=ending, role="doubtful" if unmet else "good")

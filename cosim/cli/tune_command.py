@@ -6,13 +6,14 @@ import argparse
 import logging
 from pathlib import Path
 
-from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
+from cosim.cli.arguments import FIGURE_FILES, MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
 from cosim.cli.scenarios import load_scenario, read_setting
 from cosim.errors import ScenarioError
 from cosim.results.results_folder import check_writable
 from cosim.simulation.scenario import Scenario
 from cosim.tuning.parameters import Bounds
 from cosim.tuning.tune import tune
+from cosim.tuning.tuning_files import PAGE, write_figures
 from cosim.tuning.tuning_result import Tuning
 from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
@@ -85,6 +86,7 @@ ARGUMENTS = (
     argument("--out", metavar="DIR", help="folder for history and results (default: results/NAME_tuned)"),
     *MANY_RUNS,
     argument("--whole-runs", action="store_true", help="run the whole scenario, also where a recording would do"),
+    FIGURE_FILES,
     QUIET,
 )
 
@@ -103,11 +105,12 @@ def execute(options: argparse.Namespace) -> Output:
     found = _tuned(scenario, options, directory)
     for text in found.warnings:
         LOG.warning(text)
+    drawn = write_figures(found, directory, options.figures)
     lucky = bool(found.validated) and not found.shown_better
     return Output(
         found.details(),
         found.to_data(),
-        {"tuned": directory / "tuned.toml"},
+        {"tuned": directory / "tuned.toml", "page": directory / PAGE} | drawn,
         code=_NOT_BETTER if lucky else _DONE,
         error=KeyboardInterrupt() if found.interrupted else None,
         verdict=found.verdict,

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import wraps
-from io import BytesIO
+from io import BytesIO, StringIO
 from typing import Any, ParamSpec, TypeVar
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.rcsetup import cycler
 
@@ -191,3 +192,28 @@ def png(figure: Figure | SubFigure, dpi: int = _DPI) -> bytes:
         whole.set_canvas(before[0])
         whole.set(dpi=before[1], facecolor=before[2])
     return buffer.getvalue()
+
+
+def picture(figure: Figure | SubFigure, kind: str) -> bytes:
+    """A figure as a file.
+
+    Args:
+        figure: the figure, or a part of it.
+        kind: ``png`` or ``svg``, in which texts stay texts.
+    """
+    return _svg(figure) if kind == "svg" else png(figure)
+
+
+def _svg(figure: Figure | SubFigure) -> bytes:
+    """A figure as SVG; equal figures are equal bytes."""
+    whole = figure.get_figure(root=True)
+    assert whole is not None
+    before, buffer = (whole.canvas, whole.get_facecolor()), StringIO()
+    try:
+        whole.set(facecolor="white")
+        with rc_context({"svg.hashsalt": "figure", "svg.fonttype": "none"}):
+            FigureCanvasSVG(whole).print_svg(buffer, metadata={"Date": None, "Creator": None})
+    finally:
+        whole.set_canvas(before[0])
+        whole.set(facecolor=before[1])
+    return buffer.getvalue().encode("utf-8")

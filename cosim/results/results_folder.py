@@ -30,16 +30,16 @@ REPORT, FIGURES = "report.html", "figures"
 LAYOUT = 1  # version of the layout of summary.json
 
 
-def remove_report(directory: str | Path, keep: Collection[str] = ()) -> None:
+def remove_report(directory: str | Path, keep: Collection[Path] = ()) -> None:
     """Remove the page and the pictures of an earlier run, which would not speak of these results.
 
     Args:
-        directory: the results folder. keep: stems of the pictures that are of this run.
+        directory: the results folder. keep: pictures that are of this run.
     """
     folder = Path(directory)
     (folder / REPORT).unlink(missing_ok=True)
-    for picture in (folder / FIGURES).glob("*.png"):
-        if picture.stem not in keep:
+    for picture in (folder / FIGURES).glob("*.*"):
+        if picture.suffix in (".png", ".svg") and picture not in keep:
             picture.unlink(missing_ok=True)
 
 

@@ -18,6 +18,7 @@ from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.evaluated import Evaluated, evaluated_table
 from cosim.report.live.live_page import PageVerdict
+from cosim.report.page.picture_files import Pictures
 from cosim.report.page.run_verdict import observer_statuses, run_verdict
 from cosim.results.result import Result
 from cosim.results.results_folder import REPORT, remove_report, write_results
@@ -182,13 +183,14 @@ class Outcome(FirstScreen, Mapping[str, np.ndarray]):
         return self if self.origin is None else replace(self, origin=replace(self.origin, command=command))
 
     def write(
-        self, directory: str | Path, *, report: bool = True, figures: bool = False, files_up_to: float = 50e6
+        self, directory: str | Path, *, report: bool = True, figures: Pictures = False, files_up_to: float = 50e6
     ) -> dict[str, Path]:
         """Write result files, how they were made, and, where wanted, the report.
 
         Args:
             directory: the folder; results that an earlier run left there are replaced.
-            report: whether to write the page as well. figures: whether to draw its figures as PNG files, too.
+            report: whether to write the page as well. figures: whether to draw its figures as files, too:
+                True or ``"png"``, or ``"svg"``.
             files_up_to: FMUs, recordings and other files of the scenario up to this size are copied to
                 ``made_from/files``; of larger ones path and hash are noted [bytes].
 

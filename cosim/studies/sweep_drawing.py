@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
-from cosim.drawing.style import OBSERVER_LINES, axes_or_new, styled
+from cosim.drawing.style import OBSERVER_LINES, axes_or_new, picture, styled
 from cosim.errors import OutputError, nearest
 from cosim.studies.measures import setting_text, with_unit
 from cosim.studies.setting_units import setting_unit
@@ -49,6 +51,8 @@ def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax
         ax.plot(x, y, marker="o", markersize=4, label=label or None, **style)
     if ticks is not None:
         ax.set_xticks(range(len(ticks)), ticks)
+    elif all(isinstance(run.settings.get(against), int) for run in result.runs):
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))  # there is no seed 0.25
     ax.set_xlabel(with_unit(against, setting_unit(result, against)))
     ax.set_ylabel(with_unit(measure, result.unit(measure)))
     if result.failed:
@@ -56,6 +60,20 @@ def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax
     if 1 < len(groups) <= _LINES_NAMED:
         ax.legend()
     return ax
+
+
+def draw_measures(result: SweepRuns, kind: str) -> dict[str, bytes]:
+    """Figures of all measures that tables show and some run has, over the first value that varies, by measure.
+
+    Args:
+        result: the runs. kind: of file, ``png`` or ``svg``.
+    """
+    known = [column.key for column in result.columns if any(isfinite(m) for m in _values(result, column.key))]
+    return {measure: picture(sweep_figure(result, measure, None, None).figure, kind) for measure in known}
+
+
+def _values(result: SweepRuns, measure: str) -> list[float]:
+    return [run.measures.get(measure, nan) for run in result.runs]
 
 
 def _chosen(what: str, name: str | None, known: Sequence[str]) -> str:
@@ -92,6 +110,6 @@ def _points(
     """Places on the axes, in order of the varied value."""
     values = [run.settings.get(against) for run in runs]
     x = np.array([float(v) for v in values] if ticks is None else [float(ticks.index(str(v))) for v in values])  # type: ignore[arg-type]
-    y = np.array([run.measures.get(measure, np.nan) for run in runs])
+    y = np.array([run.measures.get(measure, nan) for run in runs])
     order = np.argsort(x, kind="stable")
     return x[order], y[order]

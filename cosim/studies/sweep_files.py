@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 from cosim.errors import OutputError
 from cosim.report.live.render import live_page
 from cosim.report.page.page_files import page_bytes
+from cosim.report.page.picture_files import Pictures, picture_kind, write_numbered
+from cosim.results.results_folder import FIGURES
 from cosim.studies.live_sweep import sweep_page
 from fmus.tables.plain_data import jsonable
 
@@ -82,6 +84,23 @@ def write_index(result: SweepRuns, directory: Path) -> dict[str, Path]:
     except OSError as error:
         raise OutputError(f"The sweep cannot be written to {directory}: {error.strerror or error}.") from error
     return paths
+
+
+def write_figures(result: SweepRuns, directory: Path, figures: Pictures) -> dict[str, Path]:
+    """Write a picture for each measure that tables show to ``figures/``; paths by measure.
+
+    Args:
+        result: the runs. directory: of the sweep. figures: see `Pictures`; False for none.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    if not figures:
+        return {}
+    from cosim.studies.sweep_drawing import draw_measures  # noqa: PLC0415 - matplotlib only for those who draw
+
+    kind = picture_kind(figures)
+    return write_numbered(draw_measures(result, kind), directory / FIGURES, kind)
 
 
 def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:

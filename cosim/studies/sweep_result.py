@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.comparison.compare import compare
 from cosim.errors import ComparisonError
-from cosim.studies.sweep_files import write_sweep
+from cosim.report.page.picture_files import Pictures
+from cosim.studies.sweep_files import write_figures, write_sweep
 from cosim.studies.sweep_runs import SweepRuns
 
 if TYPE_CHECKING:
@@ -57,12 +58,13 @@ class SweepResult(SweepRuns):
 
         return sweep_figure(self, measure, against, ax)
 
-    def write(self, directory: str | Path) -> dict[str, Path]:
+    def write(self, directory: str | Path, *, figures: Pictures = False) -> dict[str, Path]:
         """Write a results folder for each run (``run_000``, ...), the table as ``index.csv`` and ``index.json``, and
         the page ``index.html`` to explore it.
 
         Args:
             directory: the folder; created where it does not exist.
+            figures: whether a picture of each measure is drawn as well: True or ``"png"``, or ``"svg"``.
 
         Returns:
             Paths by kind.
@@ -70,4 +72,5 @@ class SweepResult(SweepRuns):
         Raises:
             OutputError: the folder cannot be written.
         """
-        return write_sweep(self, Path(directory))
+        paths = write_sweep(self, Path(directory))
+        return paths | write_figures(self, Path(directory), figures)

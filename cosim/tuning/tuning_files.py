@@ -13,6 +13,8 @@ import tomli_w
 from cosim.errors import OutputError
 from cosim.report.live.render import live_page
 from cosim.report.page.page_files import page_bytes
+from cosim.report.page.picture_files import Pictures, picture_kind, write_pictures
+from cosim.results.results_folder import FIGURES
 from cosim.scenario.override import override
 from cosim.tuning.tuning_page import tuning_page
 from fmus.tables.plain_data import jsonable
@@ -51,6 +53,25 @@ def write_tuning(tuning: Tuning, settings: dict[str, object], directory: Path) -
     except OSError as error:
         raise OutputError(f"{directory} cannot be written: {error.strerror or error}.") from error
     return paths
+
+
+def write_figures(tuning: Tuning, directory: Path, figures: Pictures) -> dict[str, Path]:
+    """Write a picture of the convergence to ``figures/``; its path by name.
+
+    Args:
+        tuning: what was found. directory: the folder. figures: see `Pictures`; False for none.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    if not figures:
+        return {}
+    from cosim.drawing.style import picture  # noqa: PLC0415 - matplotlib only for those who draw
+    from cosim.tuning.tuning_drawing import convergence_figure  # noqa: PLC0415 - likewise
+
+    kind = picture_kind(figures)
+    drawn = {"convergence": picture(convergence_figure(tuning), kind)}
+    return write_pictures(drawn, directory / FIGURES, kind, "convergence")
 
 
 def _tables(tuning: Tuning, settings: dict[str, object]) -> dict[str, Any]:

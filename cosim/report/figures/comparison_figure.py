@@ -26,7 +26,6 @@ from cosim.drawing.style import (
     axes_or_new,
     headline,
     new_figure,
-    png,
     styled,
 )
 from cosim.report.figures.drawing import curve, legend_above, thin
@@ -125,15 +124,6 @@ def comparison_picture(signal: SignalComparison) -> Figure:
         legend_above(whole)
         legend_above(zoom, ["reference", "result", "tolerance tube"])
     return figure
-
-
-def comparison_png(signal: SignalComparison) -> bytes:
-    """The figure of `comparison_picture` as PNG.
-
-    Args:
-        signal: the comparison, with its curves.
-    """
-    return png(comparison_picture(signal))
 
 
 def _worst_window(signal: SignalComparison) -> tuple[float, float] | None:

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cosim.drawing.style import TIME, TRUE_LINE, new_figure, png, run_line, styled
+from cosim.drawing.style import TIME, TRUE_LINE, new_figure, picture, run_line, styled
 from cosim.evaluation.roles import Quantity, estimate, estimation_error, label, recorded
 from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, thin
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
@@ -28,20 +28,21 @@ class _OverlayPicture:
     """A drawn figure.
 
     Args:
-        key: stem of its file name. title: short. caption: what to see in it. png: the picture.
+        key: stem of its file name. title: short. caption: what to see in it. data: the picture.
     """
 
     key: str
     title: str
     caption: str
-    png: bytes
+    data: bytes
 
 
-def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> list[_OverlayPicture]:
+def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = (), kind: str = "png") -> list[_OverlayPicture]:
     """All figures that the runs have something for.
 
     Args:
         runs: from `make_runs`. signals: names of recorded signals to draw besides those that have a role.
+        kind: of file, ``png`` or ``svg``.
     """
     made = [
         ("speed", "Speed", "True speed of each run.", _true_speed_figure(runs)),
@@ -57,7 +58,7 @@ def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = ()) -> li
         *((f"signal_{i}", name, "As recorded.", _signal_figure(runs, name)) for i, name in enumerate(signals, 1)),
     ]
     return [
-        _OverlayPicture(f"overlay_{key}", title, text, png(figure))
+        _OverlayPicture(f"overlay_{key}", title, text, picture(figure, kind))
         for key, title, text, figure in made
         if figure is not None
     ]

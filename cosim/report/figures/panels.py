@@ -1,11 +1,11 @@
-"""All figures of a report, in order, and as PNG."""
+"""All figures of a report, in order, and as files."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
 
-from cosim.drawing.style import png
+from cosim.drawing.style import picture
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.panel import Panel
 from cosim.results.result import Result
@@ -24,21 +24,22 @@ def panels() -> list[type[Panel]]:
     return sorted(FIGURES.usable().values(), key=lambda panel: panel.place)
 
 
-def draw_all(result: Result, spec: ReportSpec) -> dict[type[Panel], bytes]:
-    """All figures that a run has, as PNG, in the order of the report.
+def draw_all(result: Result, spec: ReportSpec, kind: str = "png") -> dict[type[Panel], bytes]:
+    """All figures that a run has, in the order of the report.
 
     Args:
         result: the run.
         spec: roles of the signals, labels, phases and zones.
+        kind: of file, ``png`` or ``svg``.
     """
-    return dict(_drawn(result, spec))
+    return dict(_drawn(result, spec, kind))
 
 
-def _drawn(result: Result, spec: ReportSpec) -> Iterator[tuple[type[Panel], bytes]]:
+def _drawn(result: Result, spec: ReportSpec, kind: str) -> Iterator[tuple[type[Panel], bytes]]:
     """A figure that fails is left out with a warning: it takes nothing along that is computed already."""
     for panel in panels():
         try:
             if panel.available(result, spec):
-                yield panel, png(panel.draw(result, spec).figure)
+                yield panel, picture(panel.draw(result, spec).figure, kind)
         except Exception as error:
             LOG.warning("the figure %r is left out: %s", panel.name, explained(error))

@@ -5,8 +5,6 @@ only the folder it is given.
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from math import inf, isfinite
 from pathlib import Path
@@ -18,6 +16,7 @@ from cosim.report.live.live_page import Card, Folded, LivePage, Mood, PageVerdic
 from cosim.report.live.render import live_page
 from cosim.report.page.comparison_curves import comparison_marks, comparison_panels, comparison_recordings
 from cosim.report.page.page_files import explained, page_bytes, write_file
+from cosim.report.page.picture_files import PictureKind, Pictures, picture_kind, write_numbered
 from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
 from fmus.tables.table import Table
@@ -28,29 +27,28 @@ FINDINGS_SHOWN = 6
 EVENTS_SHOWN = 50
 
 
-def write_comparison(comparison: Comparison, directory: str | Path, *, pictures: bool = False) -> dict[str, Path]:
+def write_comparison(comparison: Comparison, directory: str | Path, *, pictures: Pictures = False) -> dict[str, Path]:
     """Write a comparison to a folder: page and data, and where they are asked for pictures of the worst signals.
 
     Args:
         comparison: what to write. directory: the folder; created where it does not exist.
-        pictures: whether they are drawn.
+        pictures: whether they are drawn, see `Pictures`.
 
     Returns:
-        Paths: ``html``, ``json``, and, where a signal that differs was drawn, ``png`` (the worst one's picture) and
-        ``pictures`` (the folder with all of them).
+        Paths: ``html``, ``json``, and, where a signal that differs was drawn, ``png`` or ``svg`` (the picture of the
+        worst one) and ``pictures`` (the folder with all of them).
 
     Raises:
         OutputError: the folder cannot be written.
     """
     folder = Path(directory)
-    drawn = draw_pictures(comparison) if pictures else {}
-    with _explained(folder):
-        _remove_pictures(folder / PICTURES)
+    kind = picture_kind(pictures)
+    drawn = draw_pictures(comparison, kind) if pictures else {}
     paths = {"html": write_page(comparison, folder / PAGE), "json": folder / DATA}
     with _explained(folder):
         write_file(folder / DATA, page_bytes(json.dumps(jsonable(comparison.to_dict()), indent=2) + "\n"))
-    files = write_pictures(drawn, folder / PICTURES)
-    return paths | ({"png": next(iter(files.values())), "pictures": folder / PICTURES} if files else {})
+    files = write_numbered(drawn, folder / PICTURES, kind)
+    return paths | ({kind: next(iter(files.values())), "pictures": folder / PICTURES} if files else {})
 
 
 def write_page(comparison: Comparison, path: str | Path) -> Path:
@@ -67,32 +65,17 @@ def write_page(comparison: Comparison, path: str | Path) -> Path:
     return Path(path)
 
 
-def write_pictures(pictures: Mapping[str, bytes], directory: str | Path) -> dict[str, Path]:
-    """Write the pictures alone, and return their paths by signal, the worst first.
+def draw_pictures(comparison: Comparison, kind: PictureKind = "png", most: int = _MOST_PICTURES) -> dict[str, bytes]:
+    """Pictures of the worst signals that can be drawn, by signal, the worst first.
 
     Args:
-        pictures: from `draw_pictures`. directory: the folder; created where it does not exist.
-
-    Raises:
-        OutputError: the folder cannot be written.
+        comparison: what to draw. kind: of file. most: number of pictures at most.
     """
-    paths = dict(zip(pictures, (Path(directory) / name for name in _file_names(list(pictures))), strict=True))
-    with _explained(Path(directory)):
-        for signal, path in paths.items():
-            write_file(path, pictures[signal])
-    return paths
-
-
-def draw_pictures(comparison: Comparison, most: int = _MOST_PICTURES) -> dict[str, bytes]:
-    """Pictures of the worst signals that can be drawn, PNG by signal, the worst first.
-
-    Args:
-        comparison: what to draw. most: number of pictures at most.
-    """
-    from cosim.report.figures.comparison_figure import comparison_png  # noqa: PLC0415 - matplotlib only to draw
+    from cosim.drawing.style import picture  # noqa: PLC0415 - matplotlib only to draw
+    from cosim.report.figures.comparison_figure import comparison_picture  # noqa: PLC0415 - likewise
 
     drawable = [s for s in comparison.failed if s.curves is not None]
-    return {s.name: comparison_png(s) for s in drawable[:most]}
+    return {s.name: picture(comparison_picture(s), kind) for s in drawable[:most]}
 
 
 def comparison_page(comparison: Comparison) -> LivePage:
@@ -218,17 +201,3 @@ def _use_of_tolerance(signal: SignalComparison) -> float:
 
 def _explained(place: Path) -> AbstractContextManager[None]:
     return explained(f"The comparison cannot be written to {place}", "Choose another place.")
-
-
-def _file_names(signals: Sequence[str]) -> list[str]:
-    """File names that every system takes and no two signals share, in order of badness."""
-    return [
-        f"{place:02d}_{re.sub(r'[^A-Za-z0-9._-]+', '_', name)[:80]}.png" for place, name in enumerate(signals, start=1)
-    ]
-
-
-def _remove_pictures(folder: Path) -> None:
-    """Remove what an earlier comparison drew: it would not speak of this one."""
-    if folder.is_dir():
-        for old in folder.glob("[0-9][0-9]_*.png"):
-            old.unlink()

@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cosim.evaluation.spec import ReportSpec
 from cosim.report.live.live_page import LivePage, PageVerdict, Rows, Section
 from cosim.report.live.render import live_page
 from cosim.report.page.page_files import explained, page_bytes, write_files
+from cosim.report.page.picture_files import PictureKind, Pictures, picture_kind, write_pictures
 from cosim.report.page.run_curves import run_panels, run_recording
 from cosim.report.page.run_marks import run_marks
 from cosim.report.page.run_tables import HOLDS, OBSERVER, telegrams_table
 from cosim.results.result import Result
+from cosim.results.results_folder import FIGURES
 from fmus.tables.numbers import number
 from fmus.tables.plain_data import jsonable
 from fmus.tables.table import Column, Table, text_column
@@ -49,13 +52,16 @@ class Answer:
     data: Mapping[str, Any]
 
 
-def write_benchmark(benchmark: BenchmarkScores, directory: str | Path, answer: Answer | None = None) -> dict[str, Path]:
+def write_benchmark(
+    benchmark: BenchmarkScores, directory: str | Path, answer: Answer | None = None, *, figures: Pictures = False
+) -> dict[str, Path]:
     """Write page and data of a comparison of observers.
 
     Args:
         benchmark: what to write.
         directory: the folder; created where it does not exist.
         answer: what follows from it and from other runs; None for nothing but the comparison.
+        figures: whether those of the run are drawn as well, in ``figures/``, see `Pictures`.
 
     Returns:
         Paths by kind: ``page``, ``data``.
@@ -68,7 +74,17 @@ def write_benchmark(benchmark: BenchmarkScores, directory: str | Path, answer: A
     contents = {PAGE: page_bytes(live_page(_benchmark_page(benchmark, answer))), DATA: data.encode("utf-8")}
     with explained(f"The comparison cannot be written to {folder}", "Choose another output folder."):
         write_files(folder, contents)
+    if figures:
+        write_pictures(_drawn(benchmark, picture_kind(figures)), folder / FIGURES, picture_kind(figures))
     return {"page": folder / PAGE, "data": folder / DATA}
+
+
+def _drawn(benchmark: BenchmarkScores, kind: PictureKind) -> dict[str, bytes]:
+    """Figures of the run with all observers in it, by name."""
+    from cosim.report.figures.panels import draw_all  # noqa: PLC0415 - matplotlib only for those who draw
+
+    result, spec = _merged(benchmark)
+    return {} if result is None else {panel.name: data for panel, data in draw_all(result, spec, kind).items()}
 
 
 def _benchmark_page(benchmark: BenchmarkScores, answer: Answer | None = None) -> LivePage:
@@ -77,10 +93,7 @@ def _benchmark_page(benchmark: BenchmarkScores, answer: Answer | None = None) ->
     Args:
         benchmark: what was compared. answer: what follows from it.
     """
-    result, spec = _merged_result(benchmark), benchmark.labelled_spec()
-    if result is not None:
-        names = {signal.name.partition(".")[0] for signal in result.signals}
-        spec = replace(spec, observers=[name for name in spec.observers if name in names])
+    result, spec = _merged(benchmark)
     failed = [f"{score.label}: {score.failure}" for score in benchmark.scores if score.failure is not None]
     telegrams = telegrams_table({s.label: s.telegrams for s in benchmark.scores if s.telegrams}, {}, "Observer")
     return LivePage(
@@ -145,6 +158,15 @@ def _certificates(benchmark: BenchmarkScores) -> Table:
         text_column("holds_seen", "For it"),
     ]
     return Table("certificates", columns, rows)
+
+
+def _merged(benchmark: BenchmarkScores) -> tuple[Result | None, ReportSpec]:
+    """One run with all observers in it, where any came through, and what the signals are."""
+    result, spec = _merged_result(benchmark), benchmark.labelled_spec()
+    if result is None:
+        return None, spec
+    names = {signal.name.partition(".")[0] for signal in result.signals}
+    return result, replace(spec, observers=[name for name in spec.observers if name in names])
 
 
 def _merged_result(benchmark: BenchmarkScores) -> Result | None:

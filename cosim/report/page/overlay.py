@@ -21,8 +21,9 @@ from cosim.report.live.render import live_page
 from cosim.report.overlay.changing_signals import changing_signals, largest_change
 from cosim.report.overlay.overlaid_runs import OverlayRun, make_runs
 from cosim.report.overlay.overlay_measures import Measured, detailed, measured, numbers_table
-from cosim.report.page.page_files import explained, write_file, write_page
+from cosim.report.page.page_files import write_page
 from cosim.report.page.phases import COLUMNS
+from cosim.report.page.picture_files import Pictures, picture_kind, write_pictures
 from cosim.report.page.run_curves import run_panels, run_recording
 from cosim.report.page.run_marks import run_marks
 from cosim.results.result import BaliseRecord, Result
@@ -176,7 +177,7 @@ def write_overlay(
 
 
 def write_overlay_page(
-    runs: Sequence[OverlayRun], path: str | Path, signals: Sequence[str] = (), *, figures: bool = False
+    runs: Sequence[OverlayRun], path: str | Path, signals: Sequence[str] = (), *, figures: Pictures = False
 ) -> Path:
     """Write the page of runs laid over each other; it needs no other file.
 
@@ -184,7 +185,7 @@ def write_overlay_page(
         runs: from `make_runs`.
         path: the file; its folder is created.
         signals: as for `write_overlay`.
-        figures: whether figures are drawn as well, as PNG files in ``figures/`` beside the page.
+        figures: whether figures are drawn as well, in ``figures/`` beside the page, see `Pictures`.
 
     Returns:
         Path of the page.
@@ -196,14 +197,10 @@ def write_overlay_page(
     if figures:
         from cosim.report.figures.overlay_figures import draw_overlays  # noqa: PLC0415 - matplotlib only to draw
 
-        folder = page.parent / FIGURES
+        kind = picture_kind(figures)
         chosen = signals or changing_signals(runs, SIGNALS_SHOWN)
-        drawn = draw_overlays(runs, signals) or draw_overlays(runs, chosen)
-        with explained(f"Figures cannot be written to {folder}", "Choose another folder."):
-            for stale in folder.glob("overlay_*.png"):
-                stale.unlink()
-            for picture in drawn:
-                write_file(folder / f"{picture.key}.png", picture.png)
+        drawn = draw_overlays(runs, signals, kind) or draw_overlays(runs, chosen, kind)
+        write_pictures({picture.key: picture.data for picture in drawn}, page.parent / FIGURES, kind, "overlay_*")
     return page
 
 

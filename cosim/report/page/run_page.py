@@ -13,6 +13,7 @@ from cosim.report.live.live_page import LivePage
 from cosim.report.live.render import live_page
 from cosim.report.page.derived_curves import derived_curves
 from cosim.report.page.page_files import explained, page_bytes, write_file, write_page
+from cosim.report.page.picture_files import PictureKind, Pictures, picture_kind, write_pictures
 from cosim.report.page.run_curves import run_panels, run_recording
 from cosim.report.page.run_marks import run_marks
 from cosim.report.page.run_sections import run_sections
@@ -22,14 +23,14 @@ from cosim.results.result import Result
 from cosim.results.results_folder import FIGURES, REPORT, remove_report
 
 
-def write_report(result: Result, spec: ReportSpec, directory: str | Path, *, figures: bool = False) -> Path:
-    """Write ``report.html``, and where they are asked for its figures as PNG files in ``figures/``.
+def write_report(result: Result, spec: ReportSpec, directory: str | Path, *, figures: Pictures = False) -> Path:
+    """Write ``report.html``, and where they are asked for its figures as files in ``figures/``.
 
     Args:
         result: the run; a failed one is reported as far as it came.
         spec: roles of the signals, phases, published numbers.
         directory: the folder; created where it does not exist.
-        figures: whether figures are drawn as well.
+        figures: whether figures are drawn as well, see `Pictures`.
 
     Returns:
         Path of the page.
@@ -39,30 +40,29 @@ def write_report(result: Result, spec: ReportSpec, directory: str | Path, *, fig
     """
     folder = Path(directory)
     text = live_page(run_page(result, spec))
-    files = _drawn(result, spec) if figures else {}
+    kind = picture_kind(figures)
+    files = _drawn(result, spec, kind) if figures else {}
     with explained(f"The report cannot be written to {folder}", "Choose another output folder."):
-        for name, data in files.items():
-            write_file(folder / FIGURES / f"{name}.png", data)
-        remove_report(folder, keep=files)
+        remove_report(folder, keep=write_pictures(files, folder / FIGURES, kind).values())
         write_file(folder / REPORT, page_bytes(text))
     return folder / REPORT
 
 
-def _drawn(result: Result, spec: ReportSpec) -> dict[str, bytes]:
-    """All pictures of a run, PNG by name."""
+def _drawn(result: Result, spec: ReportSpec, kind: PictureKind) -> dict[str, bytes]:
+    """All pictures of a run by name."""
     from cosim.report.figures.panels import draw_all  # noqa: PLC0415 - matplotlib only for those who draw
 
-    return {panel.name: data for panel, data in draw_all(result, spec).items()}
+    return {panel.name: data for panel, data in draw_all(result, spec, kind).items()}
 
 
-def write_report_page(result: Result, spec: ReportSpec, path: str | Path, *, figures: bool = False) -> Path:
+def write_report_page(result: Result, spec: ReportSpec, path: str | Path, *, figures: Pictures = False) -> Path:
     """Write the page alone; it needs no other file.
 
     Args:
         result: the run.
         spec: roles of the signals, phases, published numbers.
         path: the file; its folder is created.
-        figures: whether figures are drawn as well, in ``figures/`` beside the page.
+        figures: whether figures are drawn as well, in ``figures/`` beside the page, see `Pictures`.
 
     Returns:
         Path of the page.
@@ -71,9 +71,9 @@ def write_report_page(result: Result, spec: ReportSpec, path: str | Path, *, fig
         OutputError: a file cannot be written.
     """
     page = write_page(path, live_page(run_page(result, spec)))
-    with explained(f"Figures cannot be written beside {page}", "Choose another place with --out."):
-        for name, data in (_drawn(result, spec) if figures else {}).items():
-            write_file(page.parent / FIGURES / f"{name}.png", data)
+    if figures:
+        kind = picture_kind(figures)
+        write_pictures(_drawn(result, spec, kind), page.parent / FIGURES, kind)
     return page
 
 

@@ -27,7 +27,8 @@ from cosim.report.figures.comparison_figure import (
     comparison_picture,
 )
 from cosim.report.live.render import live_page
-from cosim.report.page.comparison import comparison_page, draw_pictures, write_comparison, write_page, write_pictures
+from cosim.report.page.comparison import comparison_page, draw_pictures, write_comparison, write_page
+from cosim.report.page.picture_files import write_numbered
 from cosim.results.result import Result, SignalInfo
 
 # -- pictures
@@ -213,7 +214,7 @@ def test_pictures_are_those_of_the_worst_signals_and_not_too_many() -> None:
         comparison,
         signals=[replace(s, findings=[replace(s.findings[0], size=sizes[s.name])]) for s in comparison.signals],
     )
-    pictures = draw_pictures(comparison, 1)
+    pictures = draw_pictures(comparison, most=1)
     assert list(pictures) == ["signal_2"]
     assert all(data.startswith(b"\x89PNG") for data in pictures.values())
     shown = [panel.title for panel in comparison_page(comparison).panels if panel.is_shown]
@@ -258,7 +259,7 @@ def test_pictures_of_an_earlier_comparison_go(tmp_path: Path) -> None:
 
 def test_names_of_signals_become_names_of_files(tmp_path: Path) -> None:
     wild = ["train.x[1]", "train.x(1)", 'é/../../b:"|*?' + "c" * 300]
-    paths = write_pictures(draw_pictures(Comparison("x", "y", [differing(name) for name in wild])), tmp_path)
+    paths = write_numbered(draw_pictures(Comparison("x", "y", [differing(name) for name in wild])), tmp_path, "png")
     assert set(paths) == set(wild)
     assert len({p.name.lower() for p in paths.values()}) == len(wild)
     assert all(re.fullmatch(r"[\w.-]{1,100}", p.name, re.ASCII) and p.parent == tmp_path for p in paths.values())
@@ -267,7 +268,7 @@ def test_names_of_signals_become_names_of_files(tmp_path: Path) -> None:
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="file"):
-        write_pictures(draw_pictures(different()), tmp_path / "file")
+        write_numbered(draw_pictures(different()), tmp_path / "file", "png")
     with pytest.raises(OutputError, match="file"):
         write_comparison(equal(), tmp_path / "file")
     with pytest.raises(OutputError, match=r"page\.html"):
