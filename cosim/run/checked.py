@@ -12,7 +12,7 @@ from cosim.run.checked_observers import Certificates, check_observers
 from cosim.run.checked_tables import Stated, complete_tables
 from cosim.run.connections import parse_connections
 from cosim.run.coupled import Coupled, couple
-from cosim.run.layouts import make_layout
+from cosim.run.layouts import DRAWN_GAPS, make_layout
 from cosim.run.loaded_components import LoadedComponents, load_components
 from cosim.run.missing_sources import require_sources
 from cosim.run.network_remarks import network_warnings
@@ -20,7 +20,6 @@ from cosim.run.plausible_masses import mass_warnings
 from cosim.run.remarks import Remarks
 from cosim.run.step_schedule import StepSchedule, stepping_groups
 from cosim.run.task import RunTask
-from cosim.scenario.scenario_tables import MasterTable
 from cosim.scenario.schema import ScenarioTable
 
 
@@ -71,24 +70,31 @@ def check_task(task: RunTask, building: Callable[[str], None], remarks: Remarks,
 def _parse_tables(task: RunTask, remarks: Remarks) -> Stated:
     """What can be checked before a component is loaded."""
     table = task.table
-    remarks.warn(*_idle_settings(table.master))
+    remarks.warn(*_idle_settings(table))
     layout = None
     if table.balises is not None:
         layout = make_layout(table.balises, table.start, table.stop, task.folder, task.where)
     return Stated(layout, parse_connections(table.connections, task.where))
 
 
-def _idle_settings(table: MasterTable) -> list[str]:
+def _idle_settings(table: ScenarioTable) -> list[str]:
     """What the user set that has no effect beside the other settings, in words."""
+    master, balises = table.master, table.balises
+    doubling = ("master.control = 'doubling'", master.control == "doubling")
     needs = {
-        "threads": ("algorithm", "jacobi", table.algorithm == "jacobi" or table.threads == 1),
-        "tolerance": ("control", "doubling", table.control == "doubling"),
-        "smallest_step": ("control", "doubling", table.control == "doubling"),
+        "master.threads": ("master.algorithm = 'jacobi'", master.algorithm == "jacobi" or master.threads == 1),
+        "master.tolerance": doubling,
+        "master.smallest_step": doubling,
     }
+    stated = {f"master.{key}" for key in master.model_fields_set}
+    if balises is not None:
+        drawn = ("balises.layout = 'aperiodic'", balises.layout == "aperiodic")
+        needs |= {f"balises.{key}": drawn for key in DRAWN_GAPS}
+        share = balises.position_noise == 0.0 or balises.layout == "csv" or balises.location_accuracy > 0.0
+        needs["balises.position_noise"] = ("balises.location_accuracy, of which it is a share", share)
+        stated |= {f"balises.{key}" for key in balises.model_fields_set}
     return [
-        f"master.{key} has no effect without master.{other} = '{value}'."
-        for key, (other, value, works) in needs.items()
-        if key in table.model_fields_set and not works
+        f"{key} has no effect without {other}." for key, (other, works) in needs.items() if key in stated and not works
     ]
 
 

@@ -23,6 +23,9 @@ _DELIVERED_AS_RECORDED = (
     "clock",
 )
 
+DRAWN_GAPS = ("min_gap", "max_gap", "dropout_after", "dropout_fraction", "dropout_stretch")
+"""Keys of layout ``aperiodic``."""
+
 
 def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, where: str) -> Layout:
     """The balise layout of a scenario.
@@ -42,8 +45,7 @@ def make_layout(table: BalisesTable, start: float, stop: float, folder: Path, wh
             )
     try:
         if table.layout == "aperiodic":
-            keys = ("min_gap", "max_gap", "dropout_after", "dropout_fraction", "dropout_stretch")
-            return aperiodic(stop, table.seed, start=start, **{key: getattr(table, key) for key in keys})
+            return aperiodic(stop, table.seed, start=start, **{key: getattr(table, key) for key in DRAWN_GAPS})
         if table.layout == "instants":
             return InstantLayout(np.array(table.instants, dtype=float))
         if table.layout == "recorded":

@@ -260,17 +260,21 @@ def test_a_run_that_turns_to_nan_keeps_its_rows_and_ends_with_2(
 @pytest.mark.parametrize(
     ("key", "value", "needed"),
     [
-        ("threads", 2, "algorithm = 'jacobi'"),
-        ("tolerance", 1e-3, "control = 'doubling'"),
-        ("smallest_step", 1e-3, "control = 'doubling'"),
+        ("master.threads", 2, "master.algorithm = 'jacobi'"),
+        ("master.tolerance", 1e-3, "master.control = 'doubling'"),
+        ("master.smallest_step", 1e-3, "master.control = 'doubling'"),
+        ("balises.max_gap", 0.4, "balises.layout = 'aperiodic'"),
+        ("balises.dropout_fraction", 0.3, "balises.layout = 'aperiodic'"),
+        ("balises.position_noise", 0.5, "balises.location_accuracy = 2"),
     ],
 )
 def test_a_setting_without_effect_is_reported(key: str, value: float, needed: str) -> None:
     reported: list[str] = []
-    small().run(overrides={f"master.{key}": value, "stop": 0.02}, warn=reported.append)
-    assert f"master.{key} has no effect without master.{needed}." in reported
+    small().run(overrides={key: value, "stop": 0.02}, warn=reported.append)
     name, wanted = needed.replace("'", "").split(" = ")
-    small().run(overrides={f"master.{key}": value, f"master.{name}": wanted, "stop": 0.02}, warn=reported.append)
+    assert any(text.startswith(f"{key} has no effect without {name}") for text in reported)
+    works = {key: value, name: int(wanted) if wanted.isdigit() else wanted, "stop": 0.02}
+    small().run(overrides=works, warn=reported.append)
     assert sum("has no effect" in text for text in reported) == 1
 
 
