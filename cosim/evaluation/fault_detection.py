@@ -12,16 +12,15 @@ from math import inf, nan
 from typing import Any
 
 import numpy as np
-import scipy
 
 from cosim.evaluation.metrics import FEWEST_INSTANTS, instants
 from cosim.evaluation.roles import estimate, estimation_error, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
+from fmu_observer.formulas.diagnosis.thresholds import clopper_pearson, garwood
 
 GRACE = 0.5
 """A detection that begins so soon after the end of a fault is still of that fault [s]."""
-LEVEL = 0.95
 HOUR = 3600.0
 _SEPARATE = 1e-6  # [s]: intervals closer than that are one
 
@@ -201,39 +200,6 @@ def position_errors(result: Result, spec: ReportSpec, observer: str) -> list[flo
     stamps = sorted({e.stamp for e in result.events if e.kind == "true" and e.stamp >= spec.evaluate_after})
     rows = np.searchsorted(result.time, np.asarray(stamps) - 1e-9 * np.maximum(np.abs(stamps), 1.0))
     return [float(error[row]) for row in rows if row < len(error)]
-
-
-def garwood(count: int, exposure: float, level: float = LEVEL) -> Interval:
-    """Exact interval of the rate of a Poisson process: Garwood 1936.
-
-    Args:
-        count: events seen. exposure: for how long, in the unit of the rate. level: of confidence [1].
-
-    Returns:
-        Lower and upper limit in 1/unit; NaN where nothing was seen for no time.
-    """
-    if not exposure > 0.0:
-        return nan, nan
-    tail = 0.5 * (1.0 - level)
-    low = scipy.special.gammaincinv(count, tail) if count else 0.0
-    return float(low) / exposure, float(scipy.special.gammaincinv(count + 1, 1.0 - tail)) / exposure
-
-
-def clopper_pearson(count: int, trials: int, level: float = LEVEL) -> Interval:
-    """Exact interval of a probability: Clopper and Pearson 1934.
-
-    Args:
-        count: successes. trials: out of so many. level: of confidence [1].
-
-    Returns:
-        Lower and upper limit [1]; NaN without a trial.
-    """
-    if trials < 1:
-        return nan, nan
-    tail = 0.5 * (1.0 - level)
-    low = float(scipy.special.betaincinv(count, trials - count + 1, tail)) if count else 0.0
-    high = float(scipy.special.betaincinv(count + 1, trials - count, 1.0 - tail)) if count < trials else 1.0
-    return low, high
 
 
 def _evaluated(

@@ -16,8 +16,9 @@ import numpy as np
 import scipy
 
 from cosim.errors import OutputError
-from cosim.evaluation.fault_detection import HOUR, clopper_pearson, garwood
+from cosim.evaluation.fault_detection import HOUR
 from cosim.studies.measures import RATES, SHARES, setting_text
+from fmu_observer.formulas.diagnosis.thresholds import clopper_pearson, garwood
 from fmus.tables.numbers import DASH
 from fmus.tables.numbers import number as number_text
 from fmus.tables.table import Column, Table, name_column

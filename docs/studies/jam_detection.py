@@ -37,8 +37,8 @@ from jam_runs import (
 )
 
 from cosim.drawing.style import RC
-from cosim.evaluation.fault_detection import clopper_pearson, garwood
 from fmu_observer.detection.repaired_jam_rules import certain_fault, doubt_limit
+from fmu_observer.formulas.diagnosis.thresholds import clopper_pearson, garwood
 from fmu_observer.observers.train import QuasiLpvUio
 from fmus.tables.numbers import number
 from plant_models.railway.sensors.pulses import reading_bound

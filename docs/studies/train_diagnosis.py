@@ -36,8 +36,8 @@ from fmu_observer.detection.train_isolation import FAULTS
 from fmu_observer.formulas.diagnosis.thresholds import (
     alarm_rate,
     checked,
+    clopper_pearson,
     count_alarms,
-    proportion_interval,
     rate_threshold,
 )
 
@@ -246,7 +246,7 @@ def scored(out: Mapping[str, np.ndarray], fault: str, t: np.ndarray, onsets: np.
 
 def score_row(title: str, s: Score, note: str = "") -> str:
     """A line of the table."""
-    low, high = proportion_interval(s.detected, s.faults)
+    low, high = clopper_pearson(s.detected, s.faults)
     delays = f"{np.median(s.delays):.1f} | {np.quantile(s.delays, 0.95):.1f}" if s.delays.size else "- | -"
     share = f"{100 * s.detected / s.faults:.0f} ({100 * low:.0f} to {100 * high:.0f})"
     reported = " | ".join(f"{100 * count / s.faults:.0f}" for count in (s.right, s.wrong, s.several))

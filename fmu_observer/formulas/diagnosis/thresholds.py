@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 import scipy
@@ -39,8 +40,41 @@ class _AlarmRate:
         )
 
 
+def garwood(count: int, exposure: float, level: float = 0.95) -> tuple[float, float]:
+    """Exact interval of the rate of a Poisson process: Garwood 1936.
+
+    Args:
+        count: events seen. exposure: for how long, in the unit of the rate. level: of confidence [1].
+
+    Returns:
+        Lower and upper limit in 1/unit; NaN where nothing was seen for no time.
+    """
+    if not exposure > 0.0:
+        return nan, nan
+    tail = 0.5 * (1.0 - level)
+    low = scipy.special.gammaincinv(count, tail) if count else 0.0
+    return float(low) / exposure, float(scipy.special.gammaincinv(count + 1, 1.0 - tail)) / exposure
+
+
+def clopper_pearson(count: int, trials: int, level: float = 0.95) -> tuple[float, float]:
+    """Exact interval of a probability: Clopper and Pearson 1934.
+
+    Args:
+        count: successes. trials: out of so many. level: of confidence [1].
+
+    Returns:
+        Lower and upper limit [1]; NaN without a trial.
+    """
+    if trials < 1:
+        return nan, nan
+    tail = 0.5 * (1.0 - level)
+    low = float(scipy.special.betaincinv(count, trials - count + 1, tail)) if count else 0.0
+    high = float(scipy.special.betaincinv(count + 1, trials - count, 1.0 - tail)) if count < trials else 1.0
+    return low, high
+
+
 def alarm_rate(alarms: int, hours: float, confidence: float = 0.95) -> _AlarmRate:
-    """Rate of alarms with its exact Poisson interval (Garwood 1936).
+    """Rate of alarms with the interval of `garwood`.
 
     Args:
         alarms: how many were counted, not negative. hours: time in which they were [h], positive.
@@ -55,33 +89,7 @@ def alarm_rate(alarms: int, hours: float, confidence: float = 0.95) -> _AlarmRat
             f"alarm_rate({alarms}, {hours}, {confidence}): expected a count from 0, hours above 0, confidence between "
             "0 and 1."
         )
-    tail = 0.5 * (1.0 - confidence)
-    low = 0.5 * float(scipy.special.chdtri(2 * alarms, 1.0 - tail)) if alarms else 0.0
-    high = 0.5 * float(scipy.special.chdtri(2 * alarms + 2, tail))
-    return _AlarmRate(alarms, hours, alarms / hours, low / hours, high / hours, confidence)
-
-
-def proportion_interval(hits: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Exact interval of a probability (Clopper and Pearson 1934): of detections among runs with a fault.
-
-    Args:
-        hits: how many trials succeeded. trials: how many there were, at least 1. confidence: between 0 and 1.
-
-    Returns:
-        Lower and upper end, from 0 to 1.
-
-    Raises:
-        ValueError: an argument is out of its range.
-    """
-    if not 0 <= hits <= trials or trials < 1 or not 0.0 < confidence < 1.0:
-        raise ValueError(
-            f"proportion_interval({hits}, {trials}, {confidence}): expected 0 <= hits <= trials, at least one trial, "
-            "and confidence between 0 and 1."
-        )
-    tail = 0.5 * (1.0 - confidence)
-    low = float(scipy.special.betaincinv(hits, trials - hits + 1, tail)) if hits else 0.0
-    high = float(scipy.special.betaincinv(hits + 1, trials - hits, 1.0 - tail)) if hits < trials else 1.0
-    return low, high
+    return _AlarmRate(alarms, hours, alarms / hours, *garwood(alarms, hours, confidence), confidence)
 
 
 def count_alarms(exceeds: np.ndarray) -> int:
