@@ -48,7 +48,11 @@ def write_outcome(outcome: Outcome, settings: Mapping[str, Any], folder: Path, *
 
 
 def write_sweep(result: SweepRuns, directory: Path) -> dict[str, Path]:
-    """Write all runs that are in memory, the index and a page; else as `write_index`."""
+    """Write all runs that are in memory, the index and a page; paths by kind.
+
+    Args:
+        result, directory: as of `write_index`, with its errors.
+    """
     runs = list(result.runs)
     for place, run in enumerate(runs):
         if run.outcome is not None:

@@ -129,7 +129,10 @@ def park(a: Array, b: Array, c: Array, angle: Array) -> Pair:
 
 
 def inverse_park(d: Array, q: Array, angle: Array) -> Triple:
-    """The rotor frame (d, q) to phases that add up to zero, arguments as of `to_stator`; the inverse of `park`.
+    """The rotor frame (d, q) to phases that add up to zero; the inverse of `park`.
+
+    Args:
+        d, q, angle: as of `to_stator`.
 
     Returns:
         Quantities of the three phases, in the same unit.
