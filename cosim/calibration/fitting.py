@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cosim.calibration.least_squares import Fit, NoSlopeError, fit
+from cosim.calibration.model_units import in_units_of
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
 from cosim.calibration.runs import Hidden, Runs, in_words
 from cosim.errors import nearest
@@ -153,15 +154,20 @@ def calibrate(
     """Fit the parameters of runs to a recording.
 
     Args:
-        runs: what is run; its first guesses name the parameters. recorded: what was measured.
-        noise: standard deviations of the measured signals by name; what is left out is estimated from the residuals.
+        runs: what is run; its first guesses name the parameters.
+        recorded: what was measured, with its units: numbers are brought to those of the model; what has none is taken
+            as it is, which a remark says.
+        noise: standard deviations of the measured signals by name, in the units of the model; what is left out is
+            estimated from the residuals.
         level: probability with which an interval covers, between 0 and 1.
 
     Raises:
-        CalibrationError: a parameter changes nothing that was measured, the model gives no numbers, or too few samples.
+        CalibrationError: a unit cannot be converted, a parameter changes nothing that was measured, the model gives no
+            numbers, or too few samples.
     """
     if not 0.0 < level < 1.0:
         raise CalibrationError(f"level {level!r}: expected a probability between 0 and 1, for instance 0.95.")
+    recorded, taken = in_units_of(runs, recorded)
     recorded, start = runs.prepare(recorded)
     names, measured = tuple(start), np.array(list(recorded.measured.values()))
     if np.isfinite(measured).sum() <= len(names):
@@ -171,24 +177,29 @@ def calibrate(
     bounds = np.array([runs.bounds.get(name, (-np.inf, np.inf)) for name in names]).T
     found = _fit(runs, recorded, start, measured, noise=_deviations(noise, recorded), low=bounds[0], high=bounds[1])
     _demand_effects(found, names, recorded)
-    return _calibration(runs, start, found, recorded, level, bounds)
+    remarks = (*taken, *runs.remarks(found, names, recorded), *_remarks(found, names, recorded, *bounds))
+    return _calibration(runs, start, found, recorded, level, remarks)
 
 
 def _calibration(
-    runs: Runs, start: Mapping[str, float], found: Fit, recorded: RecordedSignals, level: float, bounds: Array
+    runs: Runs,
+    start: Mapping[str, float],
+    found: Fit,
+    recorded: RecordedSignals,
+    level: float,
+    remarks: tuple[str, ...],
 ) -> Calibration:
-    """What a fit shows; signals of a table without units have those of the model."""
-    names, units = tuple(start), {name: recorded.units.get(name, "1") for name in recorded.measured}
-    units = {name: runs.unit(name) or unit if unit == "1" else unit for name, unit in units.items()}
+    """What a fit shows."""
+    names = tuple(start)
     return Calibration(
         names,
         {name: runs.unit(name) for name in names},
         dict(start),
         found,
-        replace(recorded, units=units),
+        recorded,
         level,
         tuple(runs.hidden(found, names, recorded, level)),
-        (*runs.remarks(found, names, recorded), *_remarks(found, names, recorded, *bounds)),
+        remarks,
         runs.parameter_lines(dict(zip(names, found.parameters.tolist(), strict=True))),
     )
 

@@ -24,6 +24,7 @@ from cosim.runs.job import Job
 from cosim.runs.keys import digest, version_text
 from cosim.scenario.origin import ForeignFile
 from fmus.fmi.types import is_continuous
+from fmus.fmi.units import NamedUnit, Units
 from plant_models.disk_cache.files import file_digest
 
 Array = NDArray[np.float64]
@@ -78,14 +79,15 @@ class Signals(NamedTuple):
     """What a calibration needs to know of an FMU.
 
     Attributes:
-        outputs: names. inputs: names. discrete: inputs that are no continuous ones. units: of outputs and parameters by
-            name. start: of the parameters by name. bounds: lowest and highest value of the parameters by name.
+        outputs: names. inputs: names. discrete: inputs that are no continuous ones. units: of outputs, inputs
+            and parameters by name. start: of the parameters by name. bounds: lowest and highest value of the
+            parameters by name.
     """
 
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
     discrete: tuple[str, ...]
-    units: Mapping[str, str]
+    units: Mapping[str, NamedUnit | None]
     start: Mapping[str, float]
     bounds: Mapping[str, tuple[float, float]]
 
@@ -124,14 +126,14 @@ class ReadSignals(_FmuJob):
     def do(self) -> Signals:
         """Raises: CalibrationError: a parameter cannot be set. FmuLoadError, FmuModelError: as `open_model`."""
         with self.fmu.opened() as model:
-            variables = model.instance.variables
+            variables, units = model.instance.variables, Units(model.instance.description)
             for name in self.settings:
                 self._demand_settable(name, variables[name])
             return Signals(
                 model.outputs,
                 model.inputs,
                 tuple(name for name in model.inputs if not is_continuous(variables[name])),
-                {name: model.unit(name) for name in (*model.outputs, *self.settings)},
+                {name: units.named(variables[name]) for name in (*model.outputs, *model.inputs, *self.settings)},
                 {name: _number(variables[name].start, 0.0) for name in self.settings},
                 {n: (_number(variables[n].min, -inf), _number(variables[n].max, inf)) for n in self.settings},
             )

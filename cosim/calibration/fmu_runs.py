@@ -14,6 +14,7 @@ from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
 from cosim.fmu_model.opening import Interface
 from cosim.runs.executors import make_executor
 from cosim.runs.journal import Journal
+from fmus.fmi.units import NamedUnit
 
 CALL_TIMEOUT = 60.0
 """How long a call of an FMU may last [s], unless somebody says otherwise."""
@@ -69,12 +70,17 @@ class FmuRuns(JobRuns):
         )
 
     def unit(self, name: str) -> str:
-        """Unit of an output or of a parameter as the FMU names it.
+        """Unit of an output, input or parameter as the FMU names it, empty where it names none.
 
         Args:
             name: of it.
         """
-        return str(self._signals.units[name])
+        unit = self._signals.units[name]
+        return "" if unit is None else unit.name
+
+    def named_unit(self, name: str) -> NamedUnit | None:
+        """What the unit of a signal is, by the definitions of the FMU; see `Runs.named_unit`."""
+        return self._signals.units[name]
 
     def job(self, values: Mapping[str, float], recorded: RecordedSignals) -> FmuRun:
         """A run of the FMU, see `JobRuns.job`."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cosim.components.recording_data import Chosen, Interpolation, column_courses, interval_ends, said_of
 from cosim.errors import CosimError, nearest
 from cosim.results.result import Result
+from fmus.fmi.units import NamedUnit, named_unit
 
 Array = NDArray[np.float64]
 
@@ -28,9 +29,10 @@ class RecordedSignals:
         time: instants [s], shape (n,), increasing.
         measured: what is fitted, by the name of the model's signal, each of shape (n,).
         inputs: what drives the model, by the name of its input, each of shape (n,).
-        units: of the measured signals, by name.
+        units: of the measured signals and of the inputs, by name; ``1``, or no entry, where it is not known.
         ends: what inputs say at begin and end of each interval, by name, each of shape (2, n - 1); without an entry the
             value at the begin is held.
+        places: where signals and inputs come from, by name, for messages.
     """
 
     time: Array
@@ -38,6 +40,7 @@ class RecordedSignals:
     inputs: Mapping[str, Array] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     ends: Mapping[str, Array] = field(default_factory=dict)
+    places: Mapping[str, str] = field(default_factory=dict)
 
     def part(self, samples: NDArray[np.intp]) -> RecordedSignals:
         """Some of the samples.
@@ -73,7 +76,7 @@ class Selection:
 def sort_columns(
     recording: Result,
     source: str,
-    outputs: Mapping[str, str],
+    outputs: Mapping[str, NamedUnit | None],
     inputs: Sequence[str],
     selection: Selection = Selection(),
     discrete: Collection[str] = (),
@@ -81,7 +84,7 @@ def sort_columns(
     """Find what drives the model and what it is held against.
 
     A column fits a signal of its own name, with or without the component before the point; the only output also the
-    only column of its unit.
+    only column that its unit fits. Numbers and units are those of the recording.
 
     Args:
         recording: the table. source: its name, for messages.
@@ -95,13 +98,15 @@ def sort_columns(
     chosen = _fitted(units, source, outputs, selection.signals)
     rows = _rows_of(recording.time, selection.begin, selection.end, source)
     driving, constants = _driving(list(units), source, inputs, selection.inputs)
+    used = driving | chosen
     ends = _interval_ends(recording, driving, rows, said_of(selection.between, list(driving), source), discrete)
     return RecordedSignals(
         recording.time[rows.first],
         _sampled(recording, chosen, rows),
         _sampled(recording, driving, rows) | {name: np.full(len(rows.first), v) for name, v in constants.items()},
-        {name: units[column] for name, column in chosen.items()},
+        {name: units[column] for name, column in used.items()},
         ends,
+        {name: f"{source}, column {column!r}" for name, column in used.items()},
     )
 
 
@@ -172,7 +177,7 @@ def _interval_ends(
 
 
 def _fitted(
-    units: Mapping[str, str], source: str, outputs: Mapping[str, str], signals: Sequence[str] | None
+    units: Mapping[str, str], source: str, outputs: Mapping[str, NamedUnit | None], signals: Sequence[str] | None
 ) -> dict[str, str]:
     """The column of each signal to fit."""
     if signals is not None:
@@ -180,7 +185,8 @@ def _fitted(
     chosen = {name: column for name in outputs if (column := _column(name, list(units))) is not None}
     if not chosen and len(outputs) == 1:
         (name, unit), *_ = outputs.items()
-        alike = [column for column, its in units.items() if its == unit] or list(units)
+        alike = [column for column, its in units.items() if unit is not None and named_unit(its).fits(unit)]
+        alike = alike or list(units)
         chosen = {name: alike[0]} if len(alike) == 1 else {}
     if not chosen:
         raise CalibrationError(
@@ -190,7 +196,7 @@ def _fitted(
     return chosen
 
 
-def _asked(text: str, columns: Sequence[str], source: str, outputs: Mapping[str, str]) -> tuple[str, str]:
+def _asked(text: str, columns: Sequence[str], source: str, outputs: Collection[str]) -> tuple[str, str]:
     """The signal and the column of ``name`` or ``name=column``."""
     name, _, column = text.partition("=")
     if name not in outputs:

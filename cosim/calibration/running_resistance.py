@@ -65,8 +65,9 @@ class RunningResistance(Runs):
         self.start, self.bounds = {}, {}
 
     def unit(self, name: str) -> str:
-        """Unit of a signal or a coefficient, see `Runs.unit`."""
-        rest = {"net_acceleration": "m/s2", "initial_speed": "m/s", "speed": "m/s", "acceleration": "m/s2"}
+        """Unit of a signal or a coefficient, see `Runs.unit`. Of a mass of 1 efforts are by mass."""
+        rest = {"effort": "m/s2" if self.mass == 1.0 else "N"}
+        rest |= {"net_acceleration": "m/s2", "initial_speed": "m/s", "speed": "m/s", "acceleration": "m/s2"}
         return (rest | (_PER_MASS if self.mass is None else _WITH_MASS)).get(name, "")
 
     def prepare(self, recorded: RecordedSignals) -> tuple[RecordedSignals, Mapping[str, float]]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cosim.calibration.least_squares import Fit, unseen_directions
 from cosim.calibration.recorded_signals import RecordedSignals
+from fmus.fmi.units import NamedUnit, named_unit
 
 Array = NDArray[np.float64]
 LIMIT = 0.5
@@ -50,10 +51,10 @@ class Runs(ABC):
         """Simulate with parameters.
 
         Args:
-            values: by name. recorded: instants, inputs and names of the signals.
+            values: by name. recorded: instants, inputs in the units of the model, and names of the signals.
 
         Returns:
-            The signals at the instants, shape (q, n).
+            The signals at the instants in the units of the model, shape (q, n).
         """
 
     def run_all(self, points: Sequence[Mapping[str, float]], recorded: RecordedSignals) -> Array:
@@ -75,11 +76,20 @@ class Runs(ABC):
             name: of it.
         """
 
+    def named_unit(self, name: str) -> NamedUnit | None:
+        """What the unit of a signal is; None where it is not known.
+
+        Args:
+            name: of it.
+        """
+        unit = self.unit(name)
+        return None if unit in ("", "1") else named_unit(unit)
+
     def prepare(self, recorded: RecordedSignals) -> tuple[RecordedSignals, Mapping[str, float]]:
         """The part of a recording that is fitted, and first guesses by name, of what is fitted to it.
 
         Args:
-            recorded: the whole.
+            recorded: the whole, in the units of the model.
 
         Raises:
             CalibrationError: nothing can be fitted to it.

@@ -49,7 +49,8 @@ PARSER = {
     "description": (
         "Fit parameters of an FMU, a train model of the package or a scenario to a recording by least squares, with "
         "confidence intervals, and say what cannot be identified. A model is driven by the columns of the recording "
-        "that have the names of its inputs. running_resistance, v' = effort/mass - w0 - w1 v - w2 v^2, fits davis_a, "
+        "that have the names of its inputs. Numbers are converted to the units of the model, and taken as they are "
+        "where one of the two has no unit. running_resistance, v' = effort/mass - w0 - w1 v - w2 v^2, fits davis_a, "
         "davis_b and davis_c to a measured speed and needs neither guesses nor a compiler; its settings (--set) are "
         "mass, minimum_speed and resolution."
     ),
@@ -79,10 +80,14 @@ ARGUMENTS = (
         nargs="+",
         default=[],
         metavar="NAME=COLUMN|NUMBER",
-        help="what drives an input (default: the column of its name)",
+        help="what drives an input (default: the column of its name); a number is in the unit of the input",
     ),
     argument(
-        "--noise", nargs="+", default=[], metavar="NAME=STD", help="standard deviations (default: from the residuals)"
+        "--noise",
+        nargs="+",
+        default=[],
+        metavar="NAME=STD",
+        help="standard deviations in the units of the model (default: from the residuals)",
     ),
     settings_argument("not fitted"),
     argument("--from", type=float, default=-inf, dest="begin", metavar="SECONDS", help="begin of the part to use"),
@@ -144,18 +149,18 @@ def execute(options: argparse.Namespace) -> Output:
 
 def _calibrated(options: argparse.Namespace) -> tuple[Calibration, list[str]]:
     """The calibration, and the inputs that were not recorded."""
-    recording, driven = _recording(options)
+    recording = _recording(options)
     inputs = dict(map(parse_setting, options.inputs))
     runs = _runs(options, inputs)
     try:
         selection = Selection(
             options.signals,
-            {name: value for name, value in driven.items() if name in runs.inputs} | inputs,
+            inputs,
             options.begin,
             options.end,
             between_samples(options.between),
         )
-        outputs = {name: runs.unit(name) for name in runs.outputs}
+        outputs = {name: runs.named_unit(name) for name in runs.outputs}
         recorded = sort_columns(recording, options.recording, outputs, runs.inputs, selection, runs.discrete)
         found = calibrate(runs, recorded, noise=_numbers("--noise", options.noise), level=options.level)
         return found, [name for name in runs.inputs if name not in recorded.inputs]
@@ -163,24 +168,24 @@ def _calibrated(options: argparse.Namespace) -> tuple[Calibration, list[str]]:
         runs.close()
 
 
-def _recording(options: argparse.Namespace) -> tuple[Result, dict[str, float]]:
-    """The recording, of an FMU the run under constant inputs, and these by name."""
+def _recording(options: argparse.Namespace) -> Result:
+    """The recording, of an FMU the run under constant inputs, with these among its columns."""
     driven = _numbers("--drive", options.drive)
     if not str(options.recording).lower().endswith(".fmu"):
         if driven:
             raise ScenarioError(f"--drive belongs to an FMU; {options.recording} is a result.")
-        return load_result(options.recording), {}
+        return load_result(options.recording)
     if not driven:
         raise ScenarioError(
             f"{options.recording}: an FMU is driven; say by which input and how hard: --drive effort=60e3 [N]."
         )
     scenario = cosim.Scenario.fmu(
-        options.recording, stop=options.stop, step=options.step or _RUN_STEP, parameters=driven
+        options.recording, stop=options.stop, step=options.step or _RUN_STEP, parameters=driven, record=list(driven)
     )
     outcome = scenario.run(warn=lambda _text: None)
     if outcome.failure is not None:
         raise CosimError(f"{options.recording}: {outcome.failure}")
-    return outcome.result, driven
+    return outcome.result
 
 
 def _numbers(option: str, texts: Sequence[str]) -> dict[str, float]:

@@ -16,7 +16,7 @@ from fmus.fmi import described as fmi
 from fmus.fmi.elements import Element, described
 from fmus.fmi.standard import OWN_TOOL
 from fmus.fmi.types import FLOATING_TYPES
-from fmus.fmi.units import Units
+from fmus.fmi.units import NamedUnit, Units
 from plant_models.hybrid.units import Unit, UnitError
 
 
@@ -132,6 +132,14 @@ class DescribedComponent(fmi.Described):
             name: variable, or element of an array.
         """
         return self._units.name(self.variables[name])
+
+    def named_unit(self, name: str) -> NamedUnit | None:
+        """The unit of a variable with its name, or None where it declares none.
+
+        Args:
+            name: variable, or element of an array.
+        """
+        return self._units.named(self.variables[name])
 
     def unit(self, name: str) -> Unit | None:
         """The unit of a variable from the FMU's own unit definitions, or None where it declares none.

@@ -17,7 +17,7 @@ from cosim.errors import CouplingError, nearest
 from fmu_observer.annotated_variable import is_optional
 from fmus.fmi.elements import Element, described, elements_of
 from fmus.fmi.types import FLOATING_TYPES, NUMERIC_TYPES, getter_type
-from plant_models.hybrid.units import UnitError, conversion
+from plant_models.hybrid.units import UnitError
 
 Link = tuple[str, str] | tuple[str, str, Transformation]
 """Names of a source and a target, and what happens to the number on its way besides units."""
@@ -333,21 +333,13 @@ def _conversion(
     sender, receiver = components[source[0]], components[target[0]]
     if sender.variables[source[1]].type not in FLOATING_TYPES:
         return 1.0, 0.0  # only floating-point numbers have units
-    names = sender.unit_name(source[1]), receiver.unit_name(target[1])
+    own, wanted = sender.named_unit(source[1]), receiver.named_unit(target[1])
+    if own is None or wanted is None:
+        return 1.0, 0.0
     try:
-        units = sender.unit(source[1]), receiver.unit(target[1])
-        if units[0] is None or units[1] is None:
-            return 1.0, 0.0
-        return conversion(units[0], units[1])
+        return own.to(wanted)
     except UnitError as error:
-        if names[0] == names[1] and not _both_defined(sender, receiver, source[1], target[1]):
-            return 1.0, 0.0  # a unit that neither explains, but both call the same
         where = f"{'.'.join(source)} -> {'.'.join(target)}"
-        raise CouplingError(f"Connection {where}: units {names[0]!r} and {names[1]!r} do not fit: {error}.") from error
-
-
-def _both_defined(sender: Component, receiver: Component, output: str, name: str) -> bool:
-    try:
-        return sender.unit(output) is not None and receiver.unit(name) is not None
-    except UnitError:
-        return False
+        raise CouplingError(
+            f"Connection {where}: units {own.name!r} and {wanted.name!r} do not fit: {error}."
+        ) from error

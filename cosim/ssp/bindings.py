@@ -11,12 +11,13 @@ from dataclasses import dataclass
 
 from cosim.errors import nearest
 from cosim.ssp.annotation import LISTS
-from cosim.ssp.common import FAMILIES, INTEGER, REAL, NamedUnit
+from cosim.ssp.common import FAMILIES, INTEGER, REAL
 from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
 from cosim.ssp.nets import Nets, Path, Point
 from cosim.ssp.package_data import Binding, ComponentElement, Parameter, SsdElement, SsdEntry, SystemElement
 from cosim.ssp.pipe import BOOLEANS, Pipe
+from fmus.fmi.units import NamedUnit
 
 Scalar = float | str
 Value = Scalar | list[Scalar]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from cosim.ssp.document import Node, fail, find, find_all, short
 from cosim.ssp.lapses import Lapses
+from fmus.fmi.units import NamedUnit
 from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
 
 REAL, INTEGER = "Real", "Integer"
@@ -26,14 +27,6 @@ _TRANSFORMATIONS = (
     "IntegerMappingTransformation",
     "EnumerationMappingTransformation",
 )
-
-
-@dataclass(frozen=True)
-class NamedUnit:
-    """A unit and what a file calls it; None where nothing says what it is."""
-
-    name: str
-    unit: Unit | None
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from fmpy.model_description import ModelVariable
 from lxml import etree
 
 from cosim.ssp.annotation import LISTS
-from cosim.ssp.common import FAMILIES, INTEGER, REAL, NamedUnit
+from cosim.ssp.common import FAMILIES, INTEGER, REAL
 from cosim.ssp.document import NAMESPACES, Node
+from fmus.fmi.units import NamedUnit
 from plant_models.hybrid.units import BASE_SYMBOLS, Unit
 
 TOOL = "fmu-observer"

@@ -7,12 +7,11 @@ from __future__ import annotations
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.errors import nearest
-from cosim.ssp.common import FAMILIES, NamedUnit
+from cosim.ssp.common import FAMILIES
 from cosim.ssp.document import Node, fail
 from cosim.ssp.package_data import Connector
 from fmus.fmi.types import enumeration_items
-from fmus.fmi.units import Units
-from plant_models.hybrid.units import UnitError
+from fmus.fmi.units import NamedUnit, Units
 
 
 class Interface:
@@ -42,13 +41,8 @@ class Interface:
 
     def unit(self, name: str) -> NamedUnit | None:
         """The unit of a variable, or None where it has none or one that cannot be understood."""
-        variable = self.variables[name]
-        unit_name = self._units.name(variable)
-        try:
-            unit = self._units.of(variable) if unit_name else None
-        except UnitError:
-            return None
-        return NamedUnit(unit_name, unit) if unit_name and unit else None
+        found = self._units.named(self.variables[name])
+        return found if found is not None and found.unit is not None else None
 
     def items(self, name: str) -> dict[str, int]:
         """Items of an enumeration by name; empty for another type."""

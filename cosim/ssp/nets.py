@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from cosim.components.description import read_description
 from cosim.errors import FmuLoadError, nearest
-from cosim.ssp.common import NamedUnit, Step
+from cosim.ssp.common import Step
 from cosim.ssp.document import Node, fail
 from cosim.ssp.interfaces import Interface
 from cosim.ssp.lapses import Lapses
@@ -25,6 +25,7 @@ from cosim.ssp.package_data import (
     SystemElement,
 )
 from fmus.fmi.sense import doubled_names
+from fmus.fmi.units import NamedUnit
 
 Path = tuple[str, ...]
 """Names of the elements from the root system downwards; the root itself is the empty path."""

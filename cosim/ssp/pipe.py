@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from cosim.ssp.common import Linear, NamedUnit, Step, ValueMap
+from cosim.ssp.common import Linear, Step, ValueMap
 from cosim.ssp.document import Node, fail
-from plant_models.hybrid.units import UnitError, conversion
+from fmus.fmi.units import NamedUnit
+from plant_models.hybrid.units import UnitError
 
 BOOLEANS = {"true": 1.0, "1": 1.0, "false": 0.0, "0": 0.0}
 
@@ -84,23 +85,10 @@ class Pipe:
         return name
 
     def _converted(self, unit: NamedUnit | None, node: Node) -> Pipe:
-        if self.unit is None or unit is None or self.unit == unit:
-            return self
-        one, other = self.unit.unit, unit.unit
-        if (one is None or other is None) and self.unit.name == unit.name:
-            return self  # whatever it is, both call it the same
-        if one is None or other is None:
-            unknown = (self.unit if one is None else unit).name
-            between = f"from {self.unit.name!r} to {unit.name!r}"
-            fail(
-                node,
-                f"nothing defines the unit {unknown!r}, so numbers cannot be brought {between}; define it in its "
-                f"Units.",
-            )
-        if one == other:
+        if self.unit is None or unit is None:
             return self
         try:
-            return self._affine(*conversion(one, other))
+            return self._affine(*self.unit.to(unit))
         except UnitError as error:
             fail(node, f"units {self.unit.name!r} and {unit.name!r} do not fit: {error}.")
 

@@ -2,12 +2,67 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from fmpy.model_description import ModelDescription, ModelVariable
 from fmpy.model_description import Unit as DeclaredUnit
 
-from plant_models.hybrid.units import BASE_SYMBOLS, Unit, parse_unit
+from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, conversion, parse_unit
+
+
+@dataclass(frozen=True)
+class NamedUnit:
+    """A unit and what a file calls it.
+
+    Args:
+        name: as the file has it. unit: what it is; None where nothing says it.
+    """
+
+    name: str
+    unit: Unit | None
+
+    def to(self, other: NamedUnit) -> tuple[float, float]:
+        """``(factor, offset)`` that bring a number in this unit to the other one; what nothing explains goes to what is
+        called the same.
+
+        Args:
+            other: unit of the receiver.
+
+        Raises:
+            UnitError: numbers cannot be brought from one to the other; the message says why.
+        """
+        if self.unit is not None and other.unit is not None:
+            return conversion(self.unit, other.unit)
+        if self.name == other.name:
+            return 1.0, 0.0
+        raise UnitError(
+            f"nothing defines the unit {(self if self.unit is None else other).name!r}, so numbers cannot be brought "
+            f"from {self.name!r} to {other.name!r}; define it in the file that names it"
+        )
+
+    def fits(self, other: NamedUnit) -> bool:
+        """Whether a number in this unit can be brought to the other one.
+
+        Args:
+            other: unit of the receiver.
+        """
+        try:
+            self.to(other)
+        except UnitError:
+            return False
+        return True
+
+
+def named_unit(name: str) -> NamedUnit:
+    """The unit that everybody understands by a name.
+
+    Args:
+        name: such as ``km/h``.
+    """
+    try:
+        return NamedUnit(name, parse_unit(name))
+    except UnitError:
+        return NamedUnit(name, None)
 
 
 class Units:
@@ -38,6 +93,14 @@ class Units:
             return None
         unit = self._defined(name) or parse_unit(name)
         return replace(unit, offset=0.0) if _is_relative(variable) else unit
+
+    def named(self, variable: ModelVariable) -> NamedUnit | None:
+        """The unit of a variable with its name, or None where it declares none."""
+        name = self.name(variable)
+        try:
+            return None if name is None else NamedUnit(name, self.of(variable))
+        except UnitError:
+            return NamedUnit(str(name), None)
 
     def _defined(self, name: str) -> Unit | None:
         defined = self._declared.get(name)

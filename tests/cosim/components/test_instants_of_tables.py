@@ -379,9 +379,7 @@ def test_parameters_are_identified_as_the_effort_acted(tmp_path: Path, algorithm
     fixed = more | {name: value for name, value in true.items() if name != "mass"}
     runs = FmuRuns(fmu, ["mass"], fixed=fixed, guesses={"mass": 70e3})
     selection = Selection(["speed=train.speed"])
-    recorded = sort_columns(
-        load_result(tmp_path / "run"), "run", dict.fromkeys(runs.outputs, ""), runs.inputs, selection
-    )
+    recorded = sort_columns(load_result(tmp_path / "run"), "run", dict.fromkeys(runs.outputs), runs.inputs, selection)
     mass = calibrate(runs, recorded).values["mass"]
     runs.close()
     assert mass == pytest.approx(80e3, rel=1e-9)
