@@ -85,7 +85,7 @@ static bool state_call(Over *over, int64_t call, void *function, void *state) {
     Slave *plant = &program->slaves[program->watch.slave];
     program->status = ((RestoreState)function)(plant->instance, state);
     note(program, program->watch.slave, call, 0);
-    return program->status <= STATUS_WARNING;
+    return accepted(program, program->watch.slave, call);
 }
 
 /* The plant at `time` [s] within the step, as it was, with the inputs it had. */
@@ -198,7 +198,7 @@ static bool saved_plant(Over *over, void **state) {
     memcpy(program->balises.start, over->outputs, over->size);
     program->status = ((SaveState)program->balises.save_state)(program->slaves[watch->slave].instance, state);
     note(program, watch->slave, CALL_SAVE, 0)->state = *state;
-    return program->status <= STATUS_WARNING;
+    return accepted(program, watch->slave, CALL_SAVE);
 }
 
 /* A plant that is played back, with its telegrams: it is looked at where one was sent, as `RecordedLocaliser` does. */

@@ -306,7 +306,9 @@ class CompiledStepper:
         """Add what was done here to the counters of the components."""
         if self._crossings is not None:
             self._crossings.close()
-        for step, slave, moves in zip(self.plan.steps, self._program.slaves, self._moves, strict=True):
+        for place, (step, slave, moves) in enumerate(
+            zip(self.plan.steps, self._program.slaves, self._moves, strict=True)
+        ):
             for kind, count in moves.items():
                 step.component.call_statistics[kind].add(0.0, count)
                 moves[kind] = 0
@@ -316,6 +318,7 @@ class CompiledStepper:
                 component.call_statistics[kind].add(
                     0.0, calls + slave.more_calls
                 )  # so short in C that only doStep is timed
+            self._program.hand_over_warnings(place, component)
             component.seconds += slave.seconds_over
             component.seconds += max(calls - over, 0) * typical_seconds(slave.sampled_calls, slave.sampled_seconds)
             slave.calls = slave.all_calls = slave.more_calls = slave.returns = 0

@@ -21,7 +21,7 @@ static bool succeeded(Program *program, int64_t which, int64_t call, int status)
     program->status = status;
     if (program->journal.on)
         note(program, which, call, 0);
-    return status <= STATUS_WARNING;
+    return accepted(program, which, call);
 }
 
 static bool update(Program *program, int64_t which, Telegram *telegram) {
@@ -36,7 +36,7 @@ static bool update(Program *program, int64_t which, Telegram *telegram) {
         made->number = next_event;
     }
     bool again = flags[0], terminate = flags[1], next_defined = flags[4];
-    return program->status <= STATUS_WARNING && !again && !terminate && !next_defined;
+    return accepted(program, which, CALL_UPDATE) && !again && !terminate && !next_defined;
 }
 
 static bool copy_outputs(Program *program, int64_t which, double *target) {
@@ -56,7 +56,7 @@ static bool count(Program *program, int64_t which, Telegram *telegram, bool noti
     program->status = ((Counts)telegram->get_counts)(program->slaves[which].instance, telegram->count_references, number, counts, number);
     if (program->journal.on)
         note_bytes(program, note(program, which, CALL_COUNT, 0), counts, number * sizeof(int32_t));
-    if (program->status > STATUS_WARNING)
+    if (!accepted(program, which, CALL_COUNT))
         return false;
     const bool open = notified && telegram->outcome < 0;
     for (size_t i = 0; i < number; i++) {

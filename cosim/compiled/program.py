@@ -169,6 +169,20 @@ class Program:
             said[reads[head.port]] = [RecordedReturn(head.status)]
         return said
 
+    def hand_over_warnings(self, which: int, component: Component) -> None:
+        """Add the warnings of a slave that were counted here to those of its component.
+
+        Args:
+            which: its place in the plan. component: whose slave it is.
+        """
+        slave, version = self.slaves[which], component.fmi_version
+        for call in StepperCall:
+            if slave.warnings[call]:
+                ports = {StepperCall.SET: self.writes, StepperCall.GET: self.reads}.get(call, [])
+                name = call.function(version) or " or ".join(ports[which])
+                component.call_warnings.add(name, float(slave.first_warnings[call]), int(slave.warnings[call]))
+                slave.warnings[call] = 0
+
     def journalled(self) -> dict[int, dict[str, list[RecordedReturn]]]:
         """What slaves have said since the journal was begun: by place in the plan, then by function, in order."""
         said: dict[int, dict[str, list[RecordedReturn]]] = {}

@@ -19,6 +19,14 @@ static void note_bytes(Program *program, Note *made, const void *values, size_t 
     journal->used += (int64_t)bytes;
 }
 
+/* Whether a call did what it was asked for, by the status in the program; a warning is counted. */
+static bool accepted(Program *program, int64_t which, int64_t call) {
+    Slave *slave = &program->slaves[which];
+    if (program->status == STATUS_WARNING && slave->warnings[call]++ == 0)
+        slave->first_warnings[call] = *program->last_time;
+    return program->status <= STATUS_WARNING;
+}
+
 /* -- functions of FMI ---------------------------------------------------------------------------------------------- */
 
 typedef int (*Transfer12)(void *instance, const uint32_t *references, size_t count, void *values);
@@ -90,6 +98,7 @@ static bool do_step(Program *program, int64_t which, double t, double until) {
     program->return_count = 0;
     for (;;) {
         bool ordinary = called_step(program, slave, t, until - t);
+        accepted(program, which, CALL_STEP);
         if (program->journal.on)
             note_step(program, which, ordinary);
         if (ordinary || !returned_early(program, slave, t, until))
@@ -246,7 +255,7 @@ static bool send(Program *program, int64_t which) {
         program->status = transfer(slave, &slave->writes[i]);
         if (program->journal.on)
             note(program, which, CALL_SET, i);
-        if (program->status > STATUS_WARNING)
+        if (!accepted(program, which, CALL_SET))
             return stopped(program, STOP_WRITE, which, i);
     }
     return true;
@@ -276,7 +285,7 @@ static bool read_outputs(Program *program, int64_t which) {
         program->status = transfer(slave, &slave->reads[i]);
         if (program->journal.on)
             note_bytes(program, note(program, which, CALL_GET, i), slave->reads[i].raw, (size_t)slave->reads[i].raw_bytes);
-        if (program->status > STATUS_WARNING)
+        if (!accepted(program, which, CALL_GET))
             return stopped(program, STOP_READ, which, i);
         if (slave->reads[i].places != NULL)
             unpack(&slave->reads[i]);

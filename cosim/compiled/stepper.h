@@ -75,6 +75,12 @@ typedef struct {
     double begin, end;     /* of the step [s] */
 } Followed;
 
+/* Functions in a journal, and those whose warnings are counted. */
+enum {
+    CALL_SET, CALL_STEP, CALL_GET, CALL_ENTER_EVENT, CALL_SET_CLOCK, CALL_SET_REALS, CALL_UPDATE, CALL_ENTER_STEP, CALL_COUNT, CALL_SAVE,
+    CALL_RESTORE, CALL_RELEASE, CALLS,
+};
+
 typedef struct {
     void *instance;
     void *do_step;
@@ -97,6 +103,8 @@ typedef struct {
     double seconds_over;
     int64_t returns_here, returns;     /* calls of doStep after an early return: in the present step; in all steps but those of events */
     int64_t numbers;                   /* of its calls, as `LastCall` counts them: the first one is that of setting inputs */
+    int64_t warnings[CALLS];           /* of each function: how often it returned a warning */
+    double first_warnings[CALLS];      /* when first [s] */
 } Slave;
 
 /* A plant that is watched: steps in which it may pass a balise are not for the stepper. */
@@ -167,12 +175,6 @@ typedef struct {
 
 /* What a slave is called for, counted from its `numbers`, as in `last_call.py`. */
 enum { LAST_WRITE, LAST_READ, LAST_STEP, LAST_EVENT };
-
-/* Functions in a journal. */
-enum {
-    CALL_SET, CALL_STEP, CALL_GET, CALL_ENTER_EVENT, CALL_SET_CLOCK, CALL_SET_REALS, CALL_UPDATE, CALL_ENTER_STEP, CALL_COUNT, CALL_SAVE,
-    CALL_RESTORE, CALL_RELEASE,
-};
 
 /* A call and what was said. */
 typedef struct {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 
-from cosim.compiled.journal import CJournal
+from cosim.compiled.journal import CJournal, StepperCall
 from cosim.diagnostics.sampled_times import BINS
 
 RETURNS_AT_MOST = 256
@@ -38,6 +38,8 @@ class CSlave(ctypes.Structure):
         ("more_calls", ctypes.c_int64),
         ("seconds_over", ctypes.c_double),
         *((name, ctypes.c_int64) for name in ("returns_here", "returns", "numbers")),
+        ("warnings", ctypes.c_int64 * len(StepperCall)),
+        ("first_warnings", ctypes.c_double * len(StepperCall)),
     )
 
 

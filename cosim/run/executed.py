@@ -104,6 +104,9 @@ def _warnings_after(
     for name in components:
         yield from _doubted(name, telegrams)
     for name, component in components.items():
+        if component.call_warnings:
+            yield f"{name} returned the status warning, and the run went on: {component.call_warnings}."
+    for name, component in components.items():
         wrong = {status: count for status, count in component.messages.counts.items() if status in FAULTS}
         if wrong:
             counts = ", ".join(f"{count} of status {status}" for status, count in wrong.items())

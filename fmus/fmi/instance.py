@@ -15,6 +15,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from fmus.fmi.call_warnings import CallWarnings
 from fmus.fmi.derivatives import directional_derivative
 from fmus.fmi.described import Described
 from fmus.fmi.elements import layout
@@ -51,9 +52,9 @@ class Instance(Described):
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
         super().__init__(name, slave, description)
-        self.terminated = False
-        self._alive = self._running = False
+        self.terminated = self._alive = self._running = False
         self._loaded = is_native(slave)
+        self.call_warnings = CallWarnings(self)
 
     # -- how it stands ----------------------------------------------------------------------------------------------
 
@@ -363,7 +364,6 @@ class Instance(Described):
 
     def _forget(self) -> None:
         """Drop what is remembered of a run; by default there is nothing."""
-        return
 
     def _remember(self) -> tuple[Any, ...]:
         """What belongs to a state beside the slave's own."""

@@ -17,7 +17,8 @@ from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
 from fmpy.model_description import ModelDescription
 
 from fmus.fmi.fmi1_library import FMU1SlaveRepaired
-from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION, fmi_version
+from fmus.fmi.native_calls import FUNCTION
+from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION, WARNING, fmi_version
 
 FACES: dict[tuple[int, str], type] = {
     (1, CO_SIMULATION): FMU1SlaveRepaired,
@@ -119,7 +120,14 @@ def _complete(face: type) -> Any:
 
 
 def _with_functions(face: type, load_functions: Callable[[Any], None]) -> Any:
-    return type(face.__name__, (face,), {"_loadFunctions": load_functions})  # fmpy goes by the name of the class
+    def call(self: Any, name: str, *arguments: Any) -> Any:
+        status, function = face._call(self, name, *arguments), self._functions[name]  # type: ignore[attr-defined]
+        if status == WARNING and function.restype is ctypes.c_int and isinstance(function, FUNCTION):
+            self.warned(name)  # whoever stands in for the library repeats what was counted before
+        return status
+
+    members = {"_loadFunctions": load_functions, "_call": call, "warned": lambda _self, _name: None}
+    return type(face.__name__, (face,), members)  # fmpy goes by the name of the class
 
 
 _signatures: dict[type, dict[str, tuple[list[str], list[Any], Any]]] = {}

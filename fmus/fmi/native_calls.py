@@ -58,8 +58,8 @@ def prepared_call(slave: Any, name: str, *arguments: Any) -> Callable[[], None]:
             checked(*map(_plain, arguments))
             return
         status = raw(*typed)
-        if status > WARNING:
-            raise FMICallException(name, status)
+        if status:
+            _demand_done(slave, name, status)
 
     call.native = Native(slave, name, function, raw, typed)  # type: ignore[attr-defined]
     return call
@@ -103,8 +103,15 @@ class JoinedCalls:
             return
         for raw, typed, name in self.steps:
             status = raw(*typed)
-            if status > WARNING:
-                raise FMICallException(name, status)
+            if status:
+                _demand_done(self._slave, name, status)
+
+
+def _demand_done(slave: Any, name: str, status: int) -> None:
+    """Raise `FMICallException` for a status that is worse than a warning; a warning the slave is notified of."""
+    if status > WARNING:
+        raise FMICallException(name, status)
+    slave.warned(name)
 
 
 def _done(call: Callable[[], None]) -> Callable[[], int]:

@@ -276,6 +276,16 @@ def test_what_an_fmu_changes_for_all_is_put_back_and_reported(
     assert [w for w in warnings if w.startswith(f"bad: its steps change {what}")]
 
 
+@pytest.mark.parametrize("stepper", ["python", "compiled"])
+def test_warnings_that_calls_return_are_counted(fmu: Path, tmp_path: Path, stepper: str) -> None:
+    """Of the 50 steps of 0.01 s those from 0.25 s on."""
+    assert main(["run", saved(fmu, tmp_path, "warns", stepper=stepper), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    warnings = load_result(tmp_path / "out").summary["warnings"]
+    expected = "bad returned the status warning, and the run went on: fmi2DoStep 25 times, first at t = 0.25 s."
+    assert [w for w in warnings if "status warning" in w] == [expected]
+    assert expected in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.skipif(not surroundings._has_mxcsr(), reason="x86-64 with glibc")
 def test_flushing_small_numbers_to_zero_is_put_back() -> None:
     """Of the modes of floating-point numbers the one that no function of C tells."""
