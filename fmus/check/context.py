@@ -87,11 +87,15 @@ class Context:
         runner.excite(SHARE_OF_BUDGET * self.budget)
         return runner
 
-    def fresh_runner(self) -> Runner:
-        """A runner with an instance of its own, to be spoiled; the caller puts it away."""
+    def fresh_runner(self, starts: Mapping[str, float] | None = None) -> Runner:
+        """A runner with an instance of its own, to be spoiled; the caller puts it away.
+
+        Args:
+            starts: start values by name beside those of the check.
+        """
         if self.only_once:
             self.runner.park()
-        return self.runner.twin(self.slave)
+        return self.runner.twin(self.slave, starts)
 
     @property
     def only_once(self) -> bool:

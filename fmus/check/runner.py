@@ -59,13 +59,13 @@ class Runner(AbstractContextManager["Runner"]):
         """A fresh component, not yet instantiated."""
         return self._make()
 
-    def twin(self, make: Callable[[], Slave] | None = None) -> Runner:
+    def twin(self, make: Callable[[], Slave] | None = None, starts: Mapping[str, Any] | None = None) -> Runner:
         """A second runner with an instance of its own and the same inputs.
 
         Args:
-            make: makes its component; by default the same way as here.
+            make: makes its component; by default the same way as here. starts: start values beside those of this one.
         """
-        other = Runner(make or self._make, self.starts, self.t0, self.h, until=self.end)
+        other = Runner(make or self._make, {**self.starts, **(starts or {})}, self.t0, self.h, until=self.end)
         other.amplitude, other.spread, other.excited = self.amplitude, self.spread, self.excited
         return other
 
@@ -171,6 +171,11 @@ class Runner(AbstractContextManager["Runner"]):
         self._inputs[:] = np.clip(aim, self._lowest, self._highest)
         self._write()
 
+    @property
+    def inputs(self) -> dict[str, float]:
+        """What the continuous inputs were set to, by name."""
+        return dict(zip(self._input_names, self._inputs.tolist(), strict=True))
+
     def steps(self, pattern: Sequence[float]) -> list[np.ndarray]:
         """Outputs after each step of a pattern of lengths [s] from where the instance stands, each of shape (q,)."""
         rows = []
@@ -201,6 +206,7 @@ class Runner(AbstractContextManager["Runner"]):
         self._read = component.reader(names, self._outputs)
         inputs = [n for n in component.names("input") if component.variables[n].variability in (None, "continuous")]
         self._write, self._inputs = component.writer(inputs)
+        self._input_names = inputs
         declared = [component.variables[n] for n in inputs]
         starts = (self.starts.get(n, v.start) for n, v in zip(inputs, declared, strict=True))
         self._own = np.array([_number(start, 0.0) for start in starts])

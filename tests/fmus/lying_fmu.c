@@ -158,8 +158,13 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     return fmi2OK;
 }
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; i < n; i++) {
+#ifdef LIE_BOUNDS_INPUT
+        DATA(c).value[vr[i]] = value[i] > 0.125 ? 0.125 : value[i];
+#else
         DATA(c).value[vr[i]] = value[i];
+#endif
+    }
     return fmi2OK;
 }
 
@@ -288,6 +293,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
     move(instance, h);
 #endif
     instance->data.time = t + h;
+#ifdef LIE_WARNS
+    if (t > 0.1)
+        return fmi2Warning;
+#endif
     return fmi2OK;
 }
 fmi2Status fmi2CancelStep(fmi2Component c) { return fmi2Error; }

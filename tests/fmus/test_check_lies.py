@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from lying_fmus import SLAVE, STATES, build, description
+from test_fmus.events import DEEDS, hostile_fmu
 
 from fmus.check import CheckReport, Class, Verdict, check_fmu
 
@@ -62,6 +63,7 @@ def test_the_honest_one_passes_clean(tmp_path: Path) -> None:
             LIMIT,
             "leaks file descriptors: 40 more are open after 40 more instances",
         ),
+        ("BOUNDS_INPUT", "values taken", LIMIT, "does not take what it is set: force was set to 1 and is 0.125"),
         ("LEAKS_MEMORY", "repeated instantiation", LIMIT, "leaks memory"),
         ("SHARED", "two instances", LIMIT, "beside a second instance the outputs differ"),
         ("LOGGING_CHANGES", "logging", LIMIT, "with logging on the outputs differ"),
@@ -129,6 +131,21 @@ def test_prints_are_seen_and_do_not_disturb(tmp_path: Path, capfd: pytest.Captur
     assert set(problems(report)) == {"console output"}
     assert "beginning with: 'stepping to 0.01'" in report.finding("console output").detail
     assert capfd.readouterr() == ("", "")
+
+
+def test_warnings_of_calls_are_counted(tmp_path: Path) -> None:
+    report = checked(tmp_path, "WARNS")
+    assert set(problems(report)) == {"warnings"}
+    detail = "calls returned the status warning in a run of 25 steps: fmi2DoStep 14 times, first at t = 0.11 s"
+    assert report.finding("warnings").detail == detail
+
+
+def test_a_parameter_that_is_bounded_is_named(tmp_path: Path) -> None:
+    fmu = hostile_fmu(tmp_path)
+    bounds = {"deed": float(DEEDS.index("bounds"))}
+    report = check_fmu(fmu, starts=bounds)
+    assert report.finding("values taken").detail == "does not take what it is set: at was set to 0.5 and is 0.3"
+    assert check_fmu(fmu).finding("values taken").verdict is PASS
 
 
 def test_steps_that_must_be_refused(tmp_path: Path) -> None:
