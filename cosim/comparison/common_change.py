@@ -2,7 +2,8 @@
 
 Of each signal three models of one number are fitted by least squares, with the reference r and the result x:
 ``x = k r``, ``x = r + c`` and ``x(t) = r(t - d)``. One counts where it leaves a tenth of the difference or less. The
-number that most signals share is reported first.
+number that most signals share is reported first. Of a held signal the delay is known as far as its rows show when it
+changes: between two instants.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ class CommonChange:
     """One change that explains how signals differ.
 
     Args:
-        kind: which of the three. value: the factor [1], the delay [s], or the offset in `unit`.
+        kind: which of the three. value: the factor [1], the delay [s] (the middle of what is known), or the offset in
+            `unit`.
         signals: names of those it explains. unit: of an offset. text: one line for people.
     """
 
@@ -56,6 +58,8 @@ class _Fit:
     unit: str
     scale: float
     """Size by which two numbers are compared: that of what is changed, not that of a factor near one."""
+    slack: float = 0.0
+    """How far the number may be off on either hand."""
 
 
 def common_changes(comparison: ComparisonData) -> list[CommonChange]:
@@ -68,11 +72,19 @@ def common_changes(comparison: ComparisonData) -> list[CommonChange]:
     found = []
     while shared := _largest_group(fits):
         fit, names = shared
-        own = [other.value for name in names for other in fits[name] if _equal(fit, other)]
-        fit = replace(fit, value=float(np.median(own)))
+        fit = _common([other for name in names for other in fits[name] if _equal(fit, other)])
         found.append(CommonChange(fit.kind, fit.value, names, fit.unit, _text(fit, names, comparison)))
         fits = {name: own for name, own in fits.items() if name not in names}
     return found
+
+
+def _common(fits: Sequence[_Fit]) -> _Fit:
+    """The number in the middle of those that are known best; of several that leave room, the room that they share."""
+    exact = [fit.value for fit in fits if not fit.slack]
+    if exact:
+        return replace(fits[0], value=float(np.median(exact)), slack=0.0)
+    low, high = max(fit.value - fit.slack for fit in fits), min(fit.value + fit.slack for fit in fits)
+    return replace(fits[0], value=0.5 * (low + high), slack=max(0.5 * (high - low), 0.0))
 
 
 def _largest_group(fits: Mapping[str, Sequence[_Fit]]) -> tuple[_Fit, list[str]] | None:
@@ -86,7 +98,8 @@ def _largest_group(fits: Mapping[str, Sequence[_Fit]]) -> tuple[_Fit, list[str]]
 
 
 def _equal(one: _Fit, two: _Fit) -> bool:
-    return (one.kind, one.unit) == (two.kind, two.unit) and abs(one.value - two.value) <= SHARED * one.scale
+    room = SHARED * one.scale + one.slack + two.slack
+    return (one.kind, one.unit) == (two.kind, two.unit) and abs(one.value - two.value) <= room
 
 
 def _fits(signal: SignalComparison) -> list[_Fit]:
@@ -98,7 +111,8 @@ def _fits(signal: SignalComparison) -> list[_Fit]:
     difference = _rms(result - reference)
     if not difference > 0.0:
         return []
-    fits = [_factor(reference, result), _offset(reference, result, signal.unit), _delay(curves, time, result)]
+    late = _delay_of_changes(curves) if curves.held else _delay(curves, time, result)
+    fits = [_factor(reference, result), _offset(reference, result, signal.unit), late]
     return [fit for fit, left in filter(None, fits) if left <= LEFT * difference]
 
 
@@ -148,6 +162,31 @@ def _delay(curves: Curves, time: np.ndarray, result: np.ndarray) -> tuple[_Fit, 
     return _Fit("delay", best, "", abs(best)), left(best)
 
 
+def _delay_of_changes(curves: Curves) -> tuple[_Fit, float] | None:
+    """The delay of a held signal whose changes all come earlier or later; it leaves nothing.
+
+    A change lies between two rows, so the delay does, too. A few changes at one end may be lost: those that come after
+    the end, or came before the begin.
+    """
+    one, two = _changes(curves.reference_time, curves.reference), _changes(curves.result_time, curves.result)
+    count = min(one.shape[1], two.shape[1])
+    if not count or abs(one.shape[1] - two.shape[1]) > max(1, count // _STEPS):
+        return None
+    for a, b in ((one[:, :count], two[:, :count]), (one[:, -count:], two[:, -count:])):
+        low, high = float(np.max(b[0] - a[1])), float(np.min(b[1] - a[0]))
+        slack, middle = 0.5 * (high - low), 0.5 * (low + high)
+        rounding = _ROUNDING * (1.0 + abs(middle))
+        if np.max(np.abs(a[2:] - b[2:])) <= curves.allowed and -rounding <= slack <= abs(middle) + rounding:
+            return _Fit("delay", middle, "", abs(middle), max(slack, 0.0)), 0.0
+    return None
+
+
+def _changes(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Rows before and after each change: their times [s], then their values, shape (4, changes)."""
+    rows = np.flatnonzero(np.diff(values))
+    return np.stack([time[rows], time[rows + 1], values[rows], values[rows + 1]])
+
+
 def _refined(left: Callable[[float], float], at: float, step: float) -> float:
     """The place of the least value near `at`, by halving."""
     while step > _ROUNDING * max(abs(at), 1e-3):
@@ -178,8 +217,7 @@ def _text(fit: _Fit, names: Sequence[str], comparison: ComparisonData) -> str:
 def _verb(fit: _Fit, several: bool, comparison: ComparisonData) -> str:
     amount = abs(fit.value)
     if fit.kind == "delay":
-        word = "late" if fit.value > 0.0 else "early"
-        return f"{'are' if several else 'is'} {amount:.4g} s {word}{_in_steps(amount, comparison)}"
+        return f"{'are' if several else 'is'} {_delay_text(fit)}{_in_steps(amount, comparison)}"
     if fit.kind == "offset":
         return f"{'are' if several else 'is'} {with_unit(amount, fit.unit)} too {'high' if fit.value > 0.0 else 'low'}"
     if isclose(fit.value, -1.0, rel_tol=1e-3):
@@ -189,6 +227,15 @@ def _verb(fit: _Fit, several: bool, comparison: ComparisonData) -> str:
     if 0.5 < fit.value < 2.0:
         return f"{'scale' if several else 'scales'} by {100.0 * (fit.value - 1.0):+.3g} %"
     return f"{'scale' if several else 'scales'} by a factor of {fit.value:.4g}{_conversion(fit.value)}"
+
+
+def _delay_text(fit: _Fit) -> str:
+    """A delay, or the two between which it lies."""
+    word = "late" if fit.value > 0.0 else "early"
+    if fit.slack <= _ROUNDING * (1.0 + abs(fit.value)):
+        return f"{abs(fit.value):.4g} s {word}"
+    near, far = (round(abs(fit.value) + sign * fit.slack, 9) + 0.0 for sign in (-1.0, 1.0))
+    return f"between {near:.4g} and {far:.4g} s {word}"
 
 
 def _conversion(factor: float) -> str:

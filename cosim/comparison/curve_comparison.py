@@ -239,7 +239,7 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
         error = np.where(reference.finite, 0.0, np.nan)
         low, high = reference.filled - allowed.value, reference.filled + allowed.value
         time, values = reference.time, reference.values
-        curves = Curves(time, values, time, values, time, low, high, time, error, allowed.value)
+        curves = Curves(time, values, time, values, time, low, high, time, error, allowed.value, reference.held)
     return SignalComparison(
         task.name,
         task.unit,
@@ -318,6 +318,7 @@ def _curves(task: Task, points: Points, jumps: MatchedJumps, allowed: Allowed) -
         points.time,
         points.error,
         allowed.value,
+        reference.held,
     )
 
 

@@ -67,6 +67,7 @@ class Curves:
         tube_time, lower, upper: the tube; NaN rows separate its pieces.
         error_time, error: signed value error at the points compared, [unit].
         allowed: allowed size of the error [unit].
+        held: whether values stay until the next row.
     """
 
     reference_time: np.ndarray
@@ -79,6 +80,7 @@ class Curves:
     error_time: np.ndarray
     error: np.ndarray
     allowed: float
+    held: bool = False
 
 
 @dataclass(frozen=True)

@@ -83,3 +83,35 @@ def test_of_several_changes_each_is_reported_with_its_signals() -> None:
     first, second = common_changes(compared(made(TIME, **one), made(TIME, **two)))
     assert (set(first.signals), first.value) == ({"speed", "place"}, pytest.approx(1.02))
     assert second.text == "effort has the opposite sign"
+
+
+@settings(deadline=None, max_examples=10)
+@given(st.lists(st.integers(1, 30), min_size=1, max_size=6), st.integers(1, 9), st.integers(1, 7), st.booleans())
+def test_the_delay_of_a_held_signal_is_known_between_rows(
+    gaps: list[int], delay: int, every: int, is_late: bool
+) -> None:
+    """Changes fall between rows of 10 ms; one side keeps fewer rows, and both that surround a change."""
+    changes = 0.105 + 0.1 * np.cumsum(gaps)
+    time = np.arange(2000) * 0.01
+    before, after = (
+        np.searchsorted(changes + shift, time).astype(float) for shift in (0.0, 0.01 * delay)[:: 1 if is_late else -1]
+    )
+    rows = np.arange(len(time)) % every == 0
+    for row in np.flatnonzero(np.diff(before)):
+        rows[[row, row + 1]] = True
+    few, all_rows = made(time[rows], discrete=["y"], y=before[rows]), made(time, discrete=["y"], y=after)
+    (one,) = common_changes(compared(few, all_rows))
+    text = f"y is between {0.01 * (delay - 1):.4g} and {0.01 * (delay + 1):.4g} s {'late' if is_late else 'early'}"
+    assert one.text.startswith(text)
+    assert one.value == pytest.approx(0.01 * delay * (1.0 if is_late else -1.0))
+
+
+def test_the_delay_of_a_held_signal_with_the_rows_of_its_events_is_exact() -> None:
+    def stepped(at: float) -> tuple[np.ndarray, np.ndarray]:
+        time = np.sort([*TIME, at, at])
+        values = (time > at).astype(float)
+        values[np.searchsorted(time, at) + 1] = 1.0
+        return time, values
+
+    one, two = (made(time, discrete=["y"], y=values) for time, values in (stepped(1.001), stepped(1.0234)))
+    assert [change.text for change in common_changes(compared(one, two))] == ["y is 0.0224 s late"]
