@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from cosim.comparison.curve_comparison import with_unit
+from cosim.comparison.span import with_unit
 from cosim.comparison.verdict import ComparisonData, Curves, SignalComparison
 
 Kind = Literal["factor", "delay", "offset"]

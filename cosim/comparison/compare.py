@@ -14,6 +14,7 @@ from cosim.comparison.comparison import Comparison
 from cosim.comparison.curve import Curve, check_time, is_held
 from cosim.comparison.curve_comparison import Task, compare_signal
 from cosim.comparison.event_comparison import Event, compare_events, compare_telegrams
+from cosim.comparison.points import instants_within
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.comparison.verdict import ComparisonFinding, EventComparison, SignalComparison
 from cosim.errors import ComparisonError, nearest
@@ -25,6 +26,8 @@ StatedTolerance = Tolerance | Mapping[str, Any] | float
 """A tolerance as users write it, see `cosim.comparison.tolerance.tolerance`."""
 
 
+_MOST_ROWS = 0.9
+"""Share of the instants of the other side from which on both have about as many."""
 _RUN_KEYS = ("scenario", "start", "stop", "step")
 MODEL_KEYS = {"model": "is model", "fmi_version": "has FMI version", "preset": "has preset"}
 GUID = {"guid": "has the GUID"}
@@ -48,6 +51,7 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
     if bare[0] != bare[1]:
         without, with_units = labels if bare[0] else labels[::-1]
         lines.append(f"{without} names no units; its numbers were taken to be in those of {with_units}.")
+    lines += _fewer_rows((reference.time, result.time), labels)
     lines += _components(reference.summary, result.summary, GUID)
     lines += run_differences(reference, result)
     names = list(dict.fromkeys([*_unknown_names(reference), *_unknown_names(result)]))
@@ -55,6 +59,15 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
         f"The tolerance for {stated!r} fits no signal; {nearest(stated, names)}" for stated in tolerances.unused(names)
     ]
     return lines
+
+
+def _fewer_rows(times: tuple[np.ndarray, np.ndarray], labels: tuple[str, str]) -> list[str]:
+    """That one side has far fewer rows, so that not all rows of the other are compared."""
+    counts = instants_within(*times), instants_within(*times[::-1])
+    if not 0 < min(counts) < _MOST_ROWS * max(counts):
+        return []
+    few, many = labels if counts[0] < counts[1] else labels[::-1]
+    return [f"Compared at {min(counts)} instants, those of {few}; {many} has {max(counts)}."]
 
 
 def run_differences(reference: Result, result: Result) -> list[str]:
@@ -193,7 +206,7 @@ def compare_results(
         *labels,
         signals,
         compare_telegrams(reference, result, tolerances.default, pair.length),
-        notes(reference, result, tolerances, labels),
+        [*(s.remark for s in signals if s.remark), *notes(reference, result, tolerances, labels)],
         extra_fails,
         _compare_packets(reference, result, tolerances.default, pair.length),
     )

@@ -9,18 +9,17 @@ import numpy as np
 from cosim.comparison.curve import Curve
 from cosim.comparison.jumps import Jumps
 from cosim.comparison.points import Allowed, MatchedJumps, Points, compare_points, outside_between
-from cosim.comparison.span import rounding
+from cosim.comparison.span import gap_findings, rounding, runs, span_findings, unseen_findings, when, with_unit
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.tube import band_of
 from cosim.comparison.verdict import ComparisonFinding, Curves, Kind, SignalComparison
 
+_FEW_ROWS = 0.01
+"""Share of the rows, on either hand, that are few."""
+_LEAST_SPREAD = 1e-9
+"""Of the range: a standard deviation that is more than rounding."""
 WORST = 5  # points that are kept
 _WINDOW_STEPS, _WINDOW_SHARE, _WINDOW_TOLERANCES = 20.0, 0.01, 10.0  # how far off a jump is looked for
-
-
-_MOST_RUNS = (
-    20  # runs of points outside the tube that are reported one by one; more of them are joined over the gaps between
-)
 
 
 def _value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> list[ComparisonFinding]:
@@ -28,7 +27,7 @@ def _value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> l
     rows = np.flatnonzero(points.evaluated)
     size = np.abs(points.error[rows])
     found = []
-    for a, b in _runs(size > allowed.value):
+    for a, b in runs(size > allowed.value):
         inside = slice(a, b)
         worst = rows[inside][int(np.argmax(size[inside]))]
         count = int(np.count_nonzero(size[inside] > allowed.value))
@@ -39,11 +38,11 @@ def _value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> l
 def _number_findings(name: str, points: Points) -> list[ComparisonFinding]:
     """Runs of points where one side holds a number and the other none."""
     found = []
-    for a, b in _runs(points.no_number):
+    for a, b in runs(points.no_number):
         begin, end = float(points.time[a]), float(points.time[b - 1])
         values = float(points.reference[a]), float(points.result[a])
         size = float(np.count_nonzero(points.no_number[a:b]))
-        text = f"{name}: {_when(begin, end)} {_kind_of_number(points, a)} ({size:.0f} points)"
+        text = f"{name}: {when(begin, end)} {_kind_of_number(points, a)} ({size:.0f} points)"
         found.append(ComparisonFinding("nan", begin, end, *values, size, 0.0, text))
     return found
 
@@ -58,16 +57,6 @@ def _jump_findings(
     return found
 
 
-def with_unit(value: float, unit: str) -> str:
-    """A number as people read it; pure numbers without a unit.
-
-    Args:
-        value: in this unit.
-        unit: ``1`` for pure numbers.
-    """
-    return f"{value:.4g}" if unit in ("", "1") else f"{value:.4g} {unit}"
-
-
 def _value_finding(
     name: str, unit: str, points: Points, ends: tuple[int, int], worst: int, count: int, allowed: Allowed
 ) -> ComparisonFinding:
@@ -78,7 +67,7 @@ def _value_finding(
     where = f"outside the tube, {side} {limit}"
     if ends[1] > ends[0]:
         where = f"{count} points outside the tube, at worst {side} at {at:.9g} s {limit}"
-    text = f"{name}: {_when(begin, end)} {where}"
+    text = f"{name}: {when(begin, end)} {where}"
     return ComparisonFinding(
         "value",
         begin,
@@ -96,7 +85,7 @@ def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed)
     size = np.abs(jumps.shift)
     slack = rounding(*jumps.reference.end[-1:], *jumps.reference.begin[:1], 0.0)
     found = []
-    for a, b in _runs(size > allowed.time + slack):
+    for a, b in runs(size > allowed.time + slack):
         worst = a + int(np.argmax(size[a:b]))
         one, two = float(jumps.reference.end[worst]), float(jumps.result.end[worst])
         late = "late" if jumps.shift[worst] > 0.0 else "early"
@@ -104,7 +93,7 @@ def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed)
         amount = f"{size[worst]:.4g} s {late} (allowed {allowed.time:.4g} s)"
         text = f"{name}: the jump of {height} at {one:.9g} s comes {amount}"
         if b - a > 1:
-            span = _when(float(jumps.reference.end[a]), float(jumps.reference.end[b - 1]))
+            span = when(float(jumps.reference.end[a]), float(jumps.reference.end[b - 1]))
             text = f"{name}: {span} {b - a} jumps at other instants, at worst {amount} at {one:.9g} s"
         last = float(max(jumps.reference.end[b - 1], jumps.result.end[b - 1]))
         begin = float(min(jumps.reference.end[a], jumps.result.end[a]))
@@ -124,7 +113,7 @@ def _lone_findings(
     large = np.abs(jumps.size) > 2.0 * allowed.value
     confirmed = large & outside_between(points, allowed, jumps.begin, jumps.end)
     found = []
-    for a, b in _runs(confirmed):
+    for a, b in runs(confirmed):
         size = np.abs(jumps.size[a:b])
         worst = a + int(np.argmax(size))
         before, after = float(jumps.before[worst]), float(jumps.after[worst])
@@ -132,27 +121,12 @@ def _lone_findings(
         step = f"from {with_unit(before, unit)} to {with_unit(after, unit)} at {float(jumps.end[worst]):.9g} s"
         text = f"{name}: the jump {step} is {whose}"
         if b - a > 1:
-            span = _when(float(jumps.end[a]), float(jumps.end[b - 1]))
+            span = when(float(jumps.end[a]), float(jumps.end[b - 1]))
             text = f"{name}: {span} {b - a} jumps are {whose}, the largest {step}"
         values = (after, np.nan) if kind == "jump_missing" else (np.nan, after)
         begin, end, at = (float(jumps.end[row]) for row in (a, b - 1, worst))
         found.append(ComparisonFinding(kind, begin, end, *values, float(size[worst - a]), allowed.value, text, at))
     return found
-
-
-def _runs(marked: np.ndarray) -> list[tuple[int, int]]:
-    """Runs [a, b) of marked entries; where there are many, joined over the smallest gaps."""
-    rows = np.flatnonzero(marked)
-    if not len(rows):
-        return []
-    gaps = np.diff(rows)
-    widest = 1 if len(gaps) < _MOST_RUNS else max(1, int(np.partition(gaps, -_MOST_RUNS)[-_MOST_RUNS]))
-    cuts = np.flatnonzero(gaps > widest) + 1
-    return [(int(part[0]), int(part[-1]) + 1) for part in np.split(rows, cuts)]
-
-
-def _when(begin: float, end: float) -> str:
-    return f"at {begin:.9g} s" if begin == end else f"from {begin:.9g} to {end:.9g} s"
 
 
 def _kind_of_number(points: Points, row: int) -> str:
@@ -214,6 +188,29 @@ def compare_signal(task: Task) -> SignalComparison:
         findings=findings,
         curves=_curves(task, points, jumps, allowed) if task.curves else None,
         scale=allowed.scale,
+        remark="" if findings else _remark(task, points, allowed),
+    )
+
+
+def _remark(task: Task, points: Points, allowed: Allowed) -> str:
+    """That the range is that of a few rows, and that by the range of the others the signal would not have passed."""
+    values = task.reference.values[task.reference.finite]
+    if not len(values):
+        return ""
+    low, high = (float(value) for value in np.quantile(values, [_FEW_ROWS, 1.0 - _FEW_ROWS], method="nearest"))
+    usual = values[(values >= low) & (values <= high)]
+    spread, share = float(np.std(usual)), high - low
+    if not _LEAST_SPREAD * allowed.scale < spread < allowed.value:
+        return ""
+    inside = points.evaluated & (points.reference >= low) & (points.reference <= high)
+    error = float(np.max(np.abs(points.error[inside]), initial=0.0))
+    if error <= task.tolerance.value_for(share):
+        return ""
+    rows = len(values) - len(usual)
+    scale, rest, size, limit = (with_unit(v, task.unit) for v in (allowed.scale, share, error, allowed.value))
+    return (
+        f"{task.name}: {rows} of {len(values)} rows set its range of {scale}; the others have one of {rest} and differ "
+        f"by up to {size}, which passes (allowed {limit}): state a tolerance for it."
     )
 
 
@@ -256,11 +253,12 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
 
 
 def _findings(task: Task, points: Points, jumps: MatchedJumps, allowed: Allowed) -> list[ComparisonFinding]:
-    found = _span_findings(task.name, task.reference, task.result, allowed.time)
+    found = span_findings(task.name, task.reference, task.result, allowed.time)
     found += _number_findings(task.name, points)
     found += _jump_findings(task.name, task.unit, points, jumps, allowed)
     found += _value_findings(task.name, task.unit, points, allowed)
-    found += _gap_findings(task.name, task.reference, task.result, allowed.value, allowed.time)
+    found += gap_findings(task.name, task.reference, task.result, allowed.value, allowed.time)
+    found += unseen_findings(task.name, task.unit, (task.reference, task.result), allowed, found)
     return sorted(found, key=lambda f: (-f.size / f.allowed if f.allowed > 0.0 else -np.inf, f.time))
 
 
@@ -330,65 +328,3 @@ def _is_whole(reference: Curve, jumps: MatchedJumps) -> bool:
     return not len(rows) or (
         int(rows[-1]) + 1 < len(reference.time) and np.array_equal(reference.time[rows], jumps.reference.begin)
     )
-
-
-def _span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[ComparisonFinding]:
-    """Starts and ends that are further apart than the allowed time [s]."""
-    found = []
-    ends: tuple[tuple[float, float, Kind, Kind, str], ...] = (
-        (float(reference.time[0]), float(result.time[0]), "starts_early", "starts_late", "starts"),
-        (float(reference.time[-1]), float(result.time[-1]), "ends_early", "ends_late", "ends"),
-    )
-    for one, two, early, late, verb in ends:
-        size = abs(two - one)
-        if size > allowed + rounding(one, two):
-            text = (
-                f"{name}: {verb} at {two:.9g} s instead of {one:.9g} s, {size:.4g} s "
-                f"{'later' if two > one else 'earlier'}"
-            )
-            found.append(
-                ComparisonFinding(
-                    late if two > one else early, min(one, two), max(one, two), one, two, size, allowed, text
-                )
-            )
-    return found
-
-
-_GAP_STEPS = 10  # usual steps without a row make a gap, where the other has at least so many rows
-
-
-def _gap_findings(
-    name: str, reference: Curve, result: Curve, allowed: float, allowed_time: float
-) -> list[ComparisonFinding]:
-    """Intervals in which one side has no rows where the other has many that are not on the straight line over the
-    gap.
-
-    Args:
-        name: name of the signal.
-        reference: curve of the reference.
-        result: curve of the result.
-        allowed: error that is allowed.
-        allowed_time: shift that is allowed [s].
-    """
-    found = []
-    for lacking, full, who in ((reference, result, "reference"), (result, reference, "result")):
-        for row in _gaps(lacking, full):
-            begin, end = float(lacking.time[row]), float(lacking.time[row + 1])
-            a, b = np.searchsorted(full.time, begin, side="right"), np.searchsorted(full.time, end)
-            band = band_of(lacking, full.time[a:b], allowed_time)
-            values = full.filled[a:b]
-            off = float(np.max(np.maximum(values - band.high, band.low - values)))
-            if off > allowed:
-                text = f"{name}: the {who} has no rows from {begin:.9g} to {end:.9g} s, the other has {b - a} there"
-                found.append(
-                    ComparisonFinding("gap", begin, end, np.nan, np.nan, end - begin, _GAP_STEPS * lacking.step, text)
-                )
-    return found
-
-
-def _gaps(lacking: Curve, full: Curve) -> np.ndarray:
-    rows = np.flatnonzero(np.diff(lacking.time) > _GAP_STEPS * lacking.step)
-    if not len(rows):
-        return rows
-    begin = np.searchsorted(full.time, lacking.time[rows], side="right")
-    return np.asarray(rows[np.searchsorted(full.time, lacking.time[rows + 1]) - begin >= _GAP_STEPS])

@@ -279,7 +279,7 @@ class _View:
 
 
 def _view(reference: Curve, result: Curve, tolerance: float) -> _View:
-    swap = _overlap_rows(result, reference) > _overlap_rows(reference, result)
+    swap = instants_within(result.time, reference.time) > instants_within(reference.time, result.time)
     original, coarse = (result, reference) if swap else (reference, result)
     no_number, usable = _numbers(original, coarse, tolerance)
     fine = original
@@ -293,10 +293,14 @@ def _equal_rows(one: np.ndarray, two: np.ndarray, tolerance: float) -> bool:
     return len(one) == len(two) and bool(np.all(np.abs(one - two) <= _ROUNDED_TIME * tolerance))
 
 
-def _overlap_rows(curve: Curve, other: Curve) -> int:
-    """Number of instants of the curve between begin and end of the other."""
-    first, last = np.searchsorted(curve.time, other.time[0]), np.searchsorted(curve.time, other.time[-1], side="right")
-    inside = curve.time[first:last]
+def instants_within(time: np.ndarray, other: np.ndarray) -> int:
+    """Number of instants of one side between begin and end of the other.
+
+    Args:
+        time, other: of the rows of the sides [s], never falling.
+    """
+    first, last = np.searchsorted(time, other[0]), np.searchsorted(time, other[-1], side="right")
+    inside = time[first:last]
     return int(np.count_nonzero(np.diff(inside))) + bool(len(inside))
 
 

@@ -4,6 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from cosim.comparison.curve import Curve
+from cosim.comparison.points import Allowed
+from cosim.comparison.tube import band_of
+from cosim.comparison.unseen import unseen
+from cosim.comparison.verdict import ComparisonFinding, Kind
+
+_MOST_RUNS = (
+    20  # runs of points outside the tube that are reported one by one; more of them are joined over the gaps between
+)
+
 
 def rounding(*times: float) -> float:
     """How much two instants may differ by rounding alone [s].
@@ -12,3 +22,124 @@ def rounding(*times: float) -> float:
         times: instants [s].
     """
     return 8.0 * float(np.finfo(float).eps) * max(abs(time) for time in times)
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A number as people read it; pure numbers without a unit.
+
+    Args:
+        value: in this unit.
+        unit: ``1`` for pure numbers.
+    """
+    return f"{value:.4g}" if unit in ("", "1") else f"{value:.4g} {unit}"
+
+
+def runs(marked: np.ndarray) -> list[tuple[int, int]]:
+    """Runs [a, b) of marked entries; where there are many, joined over the smallest gaps.
+
+    Args:
+        marked: which entries are, shape (n,).
+    """
+    rows = np.flatnonzero(marked)
+    if not len(rows):
+        return []
+    gaps = np.diff(rows)
+    widest = 1 if len(gaps) < _MOST_RUNS else max(1, int(np.partition(gaps, -_MOST_RUNS)[-_MOST_RUNS]))
+    cuts = np.flatnonzero(gaps > widest) + 1
+    return [(int(part[0]), int(part[-1]) + 1) for part in np.split(rows, cuts)]
+
+
+def when(begin: float, end: float) -> str:
+    """An instant or a time span as people read it.
+
+    Args:
+        begin, end: [s].
+    """
+    return f"at {begin:.9g} s" if begin == end else f"from {begin:.9g} to {end:.9g} s"
+
+
+def span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[ComparisonFinding]:
+    """Starts and ends that are further apart than the allowed time [s]."""
+    found = []
+    ends: tuple[tuple[float, float, Kind, Kind, str], ...] = (
+        (float(reference.time[0]), float(result.time[0]), "starts_early", "starts_late", "starts"),
+        (float(reference.time[-1]), float(result.time[-1]), "ends_early", "ends_late", "ends"),
+    )
+    for one, two, early, late, verb in ends:
+        size = abs(two - one)
+        if size > allowed + rounding(one, two):
+            text = (
+                f"{name}: {verb} at {two:.9g} s instead of {one:.9g} s, {size:.4g} s "
+                f"{'later' if two > one else 'earlier'}"
+            )
+            found.append(
+                ComparisonFinding(
+                    late if two > one else early, min(one, two), max(one, two), one, two, size, allowed, text
+                )
+            )
+    return found
+
+
+_GAP_STEPS = 10  # usual steps without a row make a gap, where the other has at least so many rows
+
+
+def gap_findings(
+    name: str, reference: Curve, result: Curve, allowed: float, allowed_time: float
+) -> list[ComparisonFinding]:
+    """Intervals in which one side has no rows where the other has many that are not on the straight line over the
+    gap.
+
+    Args:
+        name: name of the signal.
+        reference: curve of the reference.
+        result: curve of the result.
+        allowed: error that is allowed.
+        allowed_time: shift that is allowed [s].
+    """
+    found = []
+    for lacking, full, who in ((reference, result, "reference"), (result, reference, "result")):
+        for row in _gaps(lacking, full):
+            begin, end = float(lacking.time[row]), float(lacking.time[row + 1])
+            a, b = np.searchsorted(full.time, begin, side="right"), np.searchsorted(full.time, end)
+            band = band_of(lacking, full.time[a:b], allowed_time)
+            values = full.filled[a:b]
+            off = float(np.max(np.maximum(values - band.high, band.low - values)))
+            if off > allowed:
+                text = f"{name}: the {who} has no rows from {begin:.9g} to {end:.9g} s, the other has {b - a} there"
+                found.append(
+                    ComparisonFinding("gap", begin, end, np.nan, np.nan, end - begin, _GAP_STEPS * lacking.step, text)
+                )
+    return found
+
+
+def unseen_findings(
+    name: str, unit: str, sides: tuple[Curve, Curve], allowed: Allowed, known: list[ComparisonFinding]
+) -> list[ComparisonFinding]:
+    """Where the reference moves between two rows of the result, beyond the gaps that are known.
+
+    Args:
+        name, unit: of the signal. sides: reference and result. allowed: difference that is allowed. known: the gaps.
+    """
+    reference = sides[0]
+    off = unseen(*sides, allowed.time)
+    for gap in (finding for finding in known if finding.kind == "gap"):
+        off[(reference.time > gap.time) & (reference.time < gap.end)] = 0.0
+    found = []
+    for a, b in runs(off > allowed.value):
+        worst = a + int(np.argmax(off[a:b]))
+        begin, end, at = (float(reference.time[row]) for row in (a, b - 1, worst))
+        size, limit = (with_unit(value, unit) for value in (float(off[worst]), allowed.value))
+        text = (
+            f"{name}: {when(begin, end)} the reference moves between two rows of the result, at worst by "
+            f"{size} at {at:.9g} s (allowed {limit}); too few rows to be compared"
+        )
+        found.append(ComparisonFinding("gap", begin, end, np.nan, np.nan, float(off[worst]), allowed.value, text, at))
+    return found
+
+
+def _gaps(lacking: Curve, full: Curve) -> np.ndarray:
+    rows = np.flatnonzero(np.diff(lacking.time) > _GAP_STEPS * lacking.step)
+    if not len(rows):
+        return rows
+    begin = np.searchsorted(full.time, lacking.time[rows], side="right")
+    return np.asarray(rows[np.searchsorted(full.time, lacking.time[rows + 1]) - begin >= _GAP_STEPS])

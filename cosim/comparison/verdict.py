@@ -102,6 +102,7 @@ class SignalComparison:
         curves: for pictures; None where there is nothing to draw.
         same_values: for a missing signal, the name of one that only the result has, with its values.
         scale: range of the reference, of which a relative tolerance is a share [unit].
+        remark: what to know of a signal that passed, a line for people; empty where there is nothing.
     """
 
     name: str
@@ -121,6 +122,7 @@ class SignalComparison:
     curves: Curves | None = None
     equal_values: str = ""
     scale: float = float("nan")
+    remark: str = ""
 
     @property
     def share_of_range(self) -> float:

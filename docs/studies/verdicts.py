@@ -18,7 +18,7 @@ from repetitions import Repetition
 from cosim import Result
 from cosim.baselines import Baseline, check, read_baseline, write_baseline
 from cosim.comparison.comparison import Comparison
-from cosim.comparison.curve_comparison import with_unit
+from cosim.comparison.span import with_unit
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.comparison.verdict import SignalComparison
 

@@ -163,3 +163,16 @@ def test_the_noise_of_a_solver_on_a_large_held_value_is_no_difference(wobble: fl
     time, noise = np.linspace(0.0, 10.0, 101), np.random.default_rng(0).uniform(-1.0, 1.0, (2, 101))
     reference, result = 101325.0 + wobble * noise
     assert signal(time, reference, result, Tolerance()).passed == passes
+
+
+@given(st.floats(1e3, 1e6), st.integers(0, 1), st.floats(0.001, 1.0))
+def test_a_range_that_a_few_rows_set_is_said(spike: float, sign: int, share: float) -> None:
+    time = np.arange(1001) * 0.1
+    small = np.sin(time)
+    large = np.where((time > 30.0) & (time < 30.45), (-1.0) ** sign * spike, 0.0)
+    reference, result = made(time, y=large + small), made(time, y=large + (1.0 - share) * small)
+    found = compared(reference, result, Tolerance(relative=1e-3))
+    assert found.equal
+    said = [note for note in found.notes if note.startswith("y: ")]
+    assert bool(said) == (1e-3 * spike > np.std(small) and share > 2e-3), said
+    assert not compared(reference, made(time, y=large + small + 1e-6 * small), Tolerance(relative=1e-3)).notes
