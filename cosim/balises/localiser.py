@@ -6,7 +6,7 @@ It may cut or redo the step; how, is up to the methods in the modules beside thi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from cosim.balises.hermite import HermiteStep
 from cosim.balises.layout import InstantLayout, TrackLayout
 from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.telegram import Crossing
+from cosim.restorable import Restorable
 
 Method = Literal["early-return", "rollback", "predict", "interpolate", "recorded"]
 METHODS: tuple[Method, ...] = ("early-return", "rollback", "predict", "interpolate")
@@ -25,7 +26,7 @@ bound.
 """
 
 
-class Localiser(ABC):
+class Localiser(Restorable, ABC):
     """Steps the watched plant and finds the crossings on the way.
 
     Args:
@@ -45,18 +46,6 @@ class Localiser(ABC):
         Returns:
             The crossings in ``(t, until]`` in order of time, each with the plant's outputs at that instant, shape (q,).
         """
-
-    def save(self) -> Any:
-        """What it remembers from step to step; the plant's own state is saved elsewhere."""
-        return None
-
-    def restore(self, state: Any) -> None:
-        """Return to what was saved.
-
-        Args:
-            state: as `save` gave it.
-        """
-        return
 
     def crossings_between(
         self, step: HermiteStep, t: float, start: np.ndarray, bound: float

@@ -12,6 +12,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cosim.restorable import Restorable
+
 LONGEST = 1e4
 """No guess moves further than so many times the largest residual. Without a bound a loop that has no solution is
 followed to values so large that the residual is a small share of them, which looks like convergence."""
@@ -19,7 +21,7 @@ followed to values so large that the residual is a small share of them, which lo
 Jacobian = Callable[[], np.ndarray | None]
 
 
-class Acceleration(ABC):
+class Acceleration(Restorable, ABC):
     """Makes the next guess. `begin` starts a new search; what was learnt in earlier ones may be kept.
 
     Args:
@@ -43,18 +45,6 @@ class Acceleration(ABC):
     @abstractmethod
     def next(self, z: np.ndarray, g: np.ndarray) -> np.ndarray:
         """The guess after `z`, for which `g` came back, each of shape (n,)."""
-
-    def save(self) -> Any:
-        """What it has learnt."""
-        return None
-
-    def restore(self, state: Any) -> None:
-        """Return to what was saved.
-
-        Args:
-            state: as `save` gave it.
-        """
-        return
 
 
 class _FixedPoint(Acceleration):

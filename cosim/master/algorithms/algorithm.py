@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 from cosim.coupling.instants import followed, held_signals
 from cosim.coupling.plan import Plan
 from cosim.master.algorithms.choose import AlgorithmChoice
+from cosim.restorable import Restorable
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class IterationSettings:
     relaxation: float = 1.0
 
 
-class Algorithm(ABC):
+class Algorithm(Restorable, ABC):
     """Brings all components of a plan, and its values, over one step.
 
     An algorithm calls `prepare` (gather the inputs) and `move` of the planned components, and nothing else of the
@@ -73,20 +74,6 @@ class Algorithm(ABC):
         others = [c for c in self.plan.connections if c.source_variable not in self.plan.held | lines]
         loop = self._loop_of
         return [str(c) for c in others if c.source[0] not in loop or loop[c.source[0]] != loop.get(c.target[0])]
-
-    def save(self) -> Any:
-        """What it remembers from step to step, so that a step taken again comes out the same; None where it is
-        nothing.
-        """
-        return None
-
-    def restore(self, state: Any) -> None:
-        """Return to what was saved.
-
-        Args:
-            state: as `save` gave it.
-        """
-        return
 
     def summary(self) -> Mapping[str, Any]:
         """What to report of it after the run, plain data: the name, why, groups, held and fresh connections,
