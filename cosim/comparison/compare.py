@@ -54,7 +54,7 @@ def notes(reference: Result, result: Result, tolerances: Tolerances, labels: tup
     lines += _fewer_rows((reference.time, result.time), labels)
     lines += _components(reference.summary, result.summary, GUID)
     lines += run_differences(reference, result)
-    names = list(dict.fromkeys([*_unknown_names(reference), *_unknown_names(result)]))
+    names = list(dict.fromkeys([*_names(reference), *_names(result)]))
     lines += [
         f"The tolerance for {stated!r} fits no signal; {nearest(stated, names)}" for stated in tolerances.unused(names)
     ]
@@ -93,10 +93,6 @@ def _states_no_units(side: Result) -> bool:
     so.
     """
     return "components" not in side.summary and all(info.unit in ("", "1") for info in side.signals)
-
-
-def _unknown_names(side: Result) -> list[str]:
-    return list(side.table.dtype.names or ())[1:]
 
 
 def _versions(one: Any, two: Any) -> list[str]:

@@ -55,7 +55,7 @@ class _Band:
 
     @property
     def body(self) -> float:
-        return max((_stack(items) for items in self.columns.values()), default=0.0)
+        return max((_height(items, _BOX_GAP) for items in self.columns.values()), default=0.0)
 
     @property
     def height(self) -> float:
@@ -141,9 +141,9 @@ class _Placing:
     # -- heights ----------------------------------------------------------------------------------------------------
 
     def _stack_up(self) -> None:
-        total = max(_height(layer) for layer in self.bands)
+        total = max(_height(layer, _BAND_GAP) for layer in self.bands)
         for layer in self.bands:
-            y = (total - _height(layer)) / 2
+            y = (total - _height(layer, _BAND_GAP)) / 2
             for band in layer:
                 band.y = y
                 self._stack_band(band)
@@ -152,7 +152,7 @@ class _Placing:
     def _stack_band(self, band: _Band) -> None:
         top = band.y + (_FRAME_TITLE if band.framed else 0.0)
         for items in band.columns.values():
-            y = top + (band.body - _stack(items)) / 2
+            y = top + (band.body - _height(items, _BOX_GAP)) / 2
             for item in items:
                 item.y = y
                 if not item.key[1]:
@@ -340,12 +340,8 @@ def _tracks(count: int) -> float:
     return _TIP + TRACK * (count + 1) if count else 0.0
 
 
-def _stack(items: Sequence[_Item]) -> float:
-    return sum(item.height for item in items) + _BOX_GAP * max(len(items) - 1, 0)
-
-
-def _height(layer: Sequence[_Band]) -> float:
-    return sum(band.height for band in layer) + _BAND_GAP * max(len(layer) - 1, 0)
+def _height(parts: Sequence[_Item | _Band], gap: float) -> float:
+    return sum(part.height for part in parts) + gap * max(len(parts) - 1, 0)
 
 
 def _mean(values: Iterable[float]) -> float:

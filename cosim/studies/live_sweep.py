@@ -7,14 +7,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
 
 from cosim.report.live.live_page import LivePage, Mood, PageCurve, PagePanel, PageRecording, PageVerdict, Rows, Section
 from cosim.results.results_folder import REPORT
-from cosim.studies.measures import UNMET, setting_text
+from cosim.studies.measures import UNMET, is_number, setting_text
 from cosim.studies.setting_units import setting_unit
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, Table
@@ -67,16 +67,12 @@ def _link(run: SweepRun, directory: Path) -> str | None:
     return f"{folder}/{REPORT}" if folder is not None and (directory / folder / REPORT).exists() else None
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
 def _table(result: SweepRuns) -> Table:
     """A row for each run: what was varied, what became of it, the chosen measures; numbers as such, which are sorted
     and drawn.
     """
     shown = result.shown()
-    numbers = {name for name in result.names if all(_is_number(run.settings.get(name)) for run in result.runs)}
+    numbers = {name for name in result.names if all(is_number(run.settings.get(name)) for run in result.runs)}
     columns = [
         Column(c.key, c.heading, setting_unit(result, c.key) or "", write=setting_text) if c.key in numbers else c
         for c in shown.columns
@@ -164,7 +160,7 @@ def _correlations(result: SweepRuns, measure: str) -> list[tuple[str, float]]:
     found = []
     for name in result.names if len(runs) >= _FEWEST else ():
         settings, values = [run.settings.get(name) for run in runs], [run.measures[measure] for run in runs]
-        if all(map(_is_number, settings)) and len(set(settings)) > 2 and len(set(values)) > 2:
+        if all(map(is_number, settings)) and len(set(settings)) > 2 and len(set(values)) > 2:
             found.append((name, float(scipy.stats.spearmanr(settings, values).statistic)))
     return found
 
@@ -173,7 +169,7 @@ def _recordings(result: SweepRuns) -> list[PageRecording]:
     """The measures over the first number that was varied, a line for each combination of the others; none where these
     are too many.
     """
-    numbers = [n for n in result.names if all(_is_number(run.settings.get(n)) for run in result.runs)]
+    numbers = [n for n in result.names if all(is_number(run.settings.get(n)) for run in result.runs)]
     varied = [n for n in numbers if len({run.settings[n] for run in result.runs}) > 2]
     if not varied or varied[0].rpartition(".")[2] == "seed":  # between seeds there is nothing
         return []

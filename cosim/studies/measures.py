@@ -169,6 +169,11 @@ def own_measures(outcome: Outcome, measure: Mapping[str, Measure]) -> tuple[dict
     return measures, faults
 
 
+def is_number(value: Any) -> bool:
+    """Whether the value of a setting is a number: neither a text nor a truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def setting_text(value: Any) -> str:
     """A value that was varied, as people write it.
 

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from cosim.drawing.style import OBSERVER_LINES, axes_or_new, picture, styled
 from cosim.errors import OutputError, nearest
-from cosim.studies.measures import setting_text, with_unit
+from cosim.studies.measures import is_number, setting_text, with_unit
 from cosim.studies.setting_units import setting_unit
 
 if TYPE_CHECKING:
@@ -84,14 +84,10 @@ def _chosen(what: str, name: str | None, known: Sequence[str]) -> str:
     return name or known[0]
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
 def _categories(values: Iterable[Any]) -> list[str] | None:
     """The values as texts in order of appearance where they are no numbers; None where they are."""
     listed = list(values)
-    return None if all(map(_is_number, listed)) else list(dict.fromkeys(map(str, listed)))
+    return None if all(map(is_number, listed)) else list(dict.fromkeys(map(str, listed)))
 
 
 def _groups(runs: Sequence[SweepRun], others: Sequence[str]) -> dict[str, list[SweepRun]]:

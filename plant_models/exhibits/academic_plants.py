@@ -9,7 +9,20 @@ import numpy as np
 from plant_models.hybrid import Array, HybridSystem, input_signal, output_signal, parameter, state
 
 
-class NonTriangularisablePlant(HybridSystem):
+class _DrivenPlant(HybridSystem):
+    """The states and the drive that acts are the outputs."""
+
+    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        return {f"x{i}": value for i, value in enumerate(x, start=1)} | {"total_drive": self._drive(t, u, p)}
+
+    @staticmethod
+    def _drive(t: Array, u: Any, p: Any) -> Array:
+        raise NotImplementedError
+
+
+class NonTriangularisablePlant(_DrivenPlant):
     """Five states with ``a = 1/(1 + x4^2)`` in row 3 and the product ``x1 x2`` in row 4: Bouchama 2024, (2.43)-(2.48).
 
     The input matrix is the five-vector of the printed vertices, ``[1 0 1 -0.3a -1]'``. Driven by the printed
@@ -21,7 +34,6 @@ class NonTriangularisablePlant(HybridSystem):
     description = "Second academic plant of chapter 2: five states, no triangular form"
     source = "Bouchama 2024, section 2.5.2"
     states = tuple(state(f"state_{i}", "1", 0.0, f"State {i}") for i in (1, 2, 3, 4, 5))
-    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
     outputs = (
         *(output_signal(f"x{i}", "1", f"State {i}") for i in (1, 2, 3, 4, 5)),
         output_signal("total_drive", "1", "Drive u that acts"),
@@ -40,15 +52,12 @@ class NonTriangularisablePlant(HybridSystem):
             "state_5": -x2 - x3 - x5 - drive,
         }
 
-    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        return {f"x{i}": value for i, value in enumerate(x, start=1)} | {"total_drive": self._drive(t, u, p)}
-
     @staticmethod
     def _drive(t: Array, u: Any, p: Any) -> Array:
         return p.drive_gain * 5.0 * np.sin(2.0 * np.pi * t) + u.drive
 
 
-class TriangularisablePlant(HybridSystem):
+class TriangularisablePlant(_DrivenPlant):
     """Four states whose last is damped by ``3.3 (sin x1 + x2^2)``: Bouchama 2024, (2.40)-(2.41).
 
     Its error equations can be brought to triangular form, so high-gain observers apply as well. Driven by the printed
@@ -60,7 +69,6 @@ class TriangularisablePlant(HybridSystem):
     description = "First academic plant of chapter 2: four states, one nonlinear damping"
     source = "Bouchama 2024, section 2.5.1"
     states = tuple(state(f"state_{i}", "1", 1.0, f"State {i}") for i in (1, 2, 3, 4))
-    inputs = (input_signal("drive", "1", 0.0, "Added to the printed drive", optional=True),)
     outputs = (
         *(output_signal(f"x{i}", "1", f"State {i}") for i in (1, 2, 3, 4)),
         output_signal("total_drive", "1", "Drive u that acts"),
@@ -79,9 +87,6 @@ class TriangularisablePlant(HybridSystem):
             "state_3": x2,
             "state_4": -19.5 * x2 - 19.5 * x3 - damping * x4,
         }
-
-    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        return {f"x{i}": value for i, value in enumerate(x, start=1)} | {"total_drive": self._drive(t, u, p)}
 
     @staticmethod
     def _drive(t: Array, u: Any, p: Any) -> Array:

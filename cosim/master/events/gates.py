@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence, Set
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
 from cosim.coupling.inputs import Inputs
 from fmus.fmi.clocks import clock_references
-from fmus.fmi.types import FLOATING_TYPES
+from fmus.fmi.types import is_continuous
 
 Send = Callable[[], None]
 
@@ -32,7 +31,7 @@ class Gate:
         self._component, self._inputs, self._events_pass = component, inputs, events_pass
         self._kinds = [component.variables[name] for name in inputs.names]
         self._clocks = [clock_references(v) for v in self._kinds]
-        flows = [_flows(v) and not clocks for v, clocks in zip(self._kinds, self._clocks, strict=True)]
+        flows = [is_continuous(v) and not clocks for v, clocks in zip(self._kinds, self._clocks, strict=True)]
         unclocked = [i for i, clocks in enumerate(self._clocks) if not clocks]
         self._discrete = np.array([i for i in unclocked if not flows[i]], dtype=np.intp)
         self._unclocked = np.array(unclocked, dtype=np.intp)
@@ -138,10 +137,6 @@ class Gate:
             write()
 
         return send
-
-
-def _flows(variable: ModelVariable) -> bool:
-    return variable.type in FLOATING_TYPES and variable.variability in (None, "continuous")
 
 
 def _nothing() -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -156,7 +157,4 @@ def largest(values: Sequence[Array]) -> Array:
     Args:
         values: at least one.
     """
-    found = values[0]
-    for value in values[1:]:
-        found = np.maximum(found, value)
-    return found
+    return reduce(np.maximum, values)

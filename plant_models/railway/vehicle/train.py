@@ -6,7 +6,9 @@ own files.
 
 from __future__ import annotations
 
+from functools import reduce
 from itertools import pairwise
+from operator import add
 from typing import Any, Literal
 
 import numpy as np
@@ -213,12 +215,12 @@ class Train(HybridSystem):
             "acceleration": (pushes[0] - dry[0] - other[0]) / p.mass,
             "wheel_speed": rims[0],
             "slip": slips[0],
-            "adhesion_force": _sum(creeps) - other[0],
+            "adhesion_force": reduce(add, creeps) - other[0],
             "rim_effort": self._rim_effort(x, u, p),
-            "resistance_force": _sum([r + d for r, d in zip(self._resistances(x, p), dry, strict=True)]),
-            "gradient_force": _sum(self._gradients(x, p)),
-            "wagon_brake_force": _sum(other[1:]),
-            "adhesion_degraded": _largest([w.degraded for w in wheelsets]),
+            "resistance_force": reduce(add, [r + d for r, d in zip(self._resistances(x, p), dry, strict=True)]),
+            "gradient_force": reduce(add, self._gradients(x, p)),
+            "wagon_brake_force": reduce(add, other[1:]),
+            "adhesion_degraded": reduce(np.maximum, [w.degraded for w in wheelsets]),
             "axle_speed": vector(*rims),
             "axle_slip": vector(*slips),
             "axle_creep_force": vector(*creeps),
@@ -235,7 +237,7 @@ class Train(HybridSystem):
 
     def _rim_effort(self, x: Any, u: Any, p: Any) -> Array:
         """What the drive and the indirect brake do at the locomotive's rims [N]; at rest the brake pushes nothing."""
-        drive = _sum([u.effort[k] for k in range(self.axles)]) if self.effort_per_axle else u.effort
+        drive = reduce(add, [u.effort[k] for k in range(self.axles)]) if self.effort_per_axle else u.effort
         return drive - np.sign(x.train_speed) * brake_force(x.cylinder[0], p.braked_mass, p)
 
     # -- forces, all against the motion but those of rail and couplers ------------------------------------------------
@@ -258,7 +260,7 @@ class Train(HybridSystem):
         couplers = [0.0, *self._couplers(x, p), 0.0]
         resistances, gradients = self._resistances(x, p), self._gradients(x, p)
         pushes = [couplers[i] - couplers[i + 1] - resistances[i] - gradients[i] for i in range(self.wagons + 1)]
-        return [pushes[0] + _sum([w.creep_force(p) for w in wheelsets]), *pushes[1:]]
+        return [pushes[0] + reduce(add, [w.creep_force(p) for w in wheelsets]), *pushes[1:]]
 
     def _couplers(self, x: Any, p: Any) -> list[Array]:
         return [coupler_force(e, rate, p) for e, rate in zip(x.elongation, _elongating(x), strict=True)]
@@ -278,7 +280,7 @@ class Train(HybridSystem):
 
     def _dry_limits(self, x: Any, wheelsets: list[Wheelset], p: Any) -> list[tuple[Array, Array]]:
         """Dry frictions of each vehicle [N]: the constant Davis term, and brake shoes or the hold of braked wheels."""
-        first = (p.davis_a, _sum([w.hold(p) for w in wheelsets]))
+        first = (p.davis_a, reduce(add, [w.hold(p) for w in wheelsets]))
         shoes = [brake_force(x.cylinder[i + 1], p.wagon_braked_mass[i], p) for i in range(self.wagons)]
         return [first, *((p.wagon_davis_a, force) for force in shoes)]
 
@@ -299,20 +301,6 @@ def _elongating(x: Any) -> list[Array]:
 def _resolved(push: Array, limit: Array, speed: Array) -> Array:
     """Dry friction [N] up to a limit against the motion, or, at rest, against what pushes."""
     return np.where(speed == 0.0, np.clip(push, -limit, limit), np.sign(speed) * limit)
-
-
-def _sum(values: list[Array]) -> Array:
-    total = values[0]
-    for value in values[1:]:
-        total = total + value
-    return total
-
-
-def _largest(values: list[Array]) -> Array:
-    largest = values[0]
-    for value in values[1:]:
-        largest = np.maximum(largest, value)
-    return largest
 
 
 def _check(wagons: int, axles: int, effort_per_axle: bool, adhesion: str, delay_samples: int) -> None:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.certificates.finding import Finding, as_printed, condition_found, gap_numbers
-from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.printed_bounds.sampled_gain_bounds import DynamicThetaBounds, dynamic_theta_bounds
 from fmu_observer.models.observer_model import ObserverModel
 from fmu_observer.observers.generic.sampled.high_gain_sampled import HighGainSampled
@@ -42,13 +41,6 @@ class OutputPredictor(HighGainSampled):
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The predicted output is set to the measured one."""
         return self.named_part(self.measured(u))
-
-    def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
-        """``de = drift e - theta inv(Delta) K c``, ``dc = -theta K_1 c``, ``c = C e`` at a sample, with
-        ``c = C xh - w``.
-        """
-        gain, decay = self.gain_matrices(p)
-        return ImpulsiveError.with_innovation(drift, gain, decay, self.model.C, self.levels())
 
 
 _THETA_LIMIT, _THETA_RATE, _THETA_START = (

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fmu_observer.certificates.finding import Finding, condition_found, gap_numbers
+from fmu_observer.certificates.gap_error import GapError
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.printed_bounds.high_gain_bounds import high_gain_bounds
 from fmu_observer.models.known_models import find_model
@@ -80,6 +81,11 @@ class HighGainSampled(SampledObserver):
         powers = theta ** (np.asarray(self.levels()) + 1.0)
         return powers[:, None] * K, theta * K[:q]
 
+    def vertex_error(self, drift: np.ndarray, p: Any) -> GapError:
+        """``de = drift e - theta inv(Delta) K c``, ``dc = -theta K_1 c``, ``c = C e`` at a sample."""
+        gain, decay = self.gain_matrices(p)
+        return ImpulsiveError.with_innovation(drift, gain, decay, self.model.C, self.levels())
+
     def condition_of(self, p: Any) -> Finding:
         """(1.51) and (1.52) with mu = 1: the smallest theta, and the longest gap, against the model's
         `sample_period`.
@@ -125,11 +131,6 @@ class ExponentialGain(HighGainSampled):
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The innovation is set anew; the estimates stay continuous."""
         return self.named_part(self.innovation(x, u))
-
-    def vertex_error(self, drift: np.ndarray, p: Any) -> ImpulsiveError:
-        """``de = drift e - theta inv(Delta) K c``, ``dc = -theta K_1 c``, ``c = C e`` at a sample."""
-        gain, decay = self.gain_matrices(p)
-        return ImpulsiveError.with_innovation(drift, gain, decay, self.model.C, self.levels())
 
 
 def chain_gain(length: int, width: int = 1) -> np.ndarray:
