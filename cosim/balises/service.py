@@ -249,7 +249,10 @@ class BaliseService:
 
     def _false_telegram(self, false: FalseTelegram, t: float, until: float) -> BaliseRecord:
         stamp = max(false.time, t)
-        position = float(self._interpolate(stamp, t, until)[self.position]) * self.localiser.watch.position_scale
+        position = (
+            float(self._mixed(stamp, t, until, slice(None), self._plan.values)[self.position])
+            * self.localiser.watch.position_scale
+        )
         reading = self._odometer_at(stamp, t, until)
         return BaliseRecord(stamp, stamp, "false", position + false.offset, position, 0.0, reading, "false")
 
@@ -297,10 +300,6 @@ class BaliseService:
             if delivery.time == time and delivery.after is not None:
                 after[columns] = delivery.after
         return [(time, before), (time, after)] if until - time > TIME_TOLERANCE else [(time, before)]
-
-    def _interpolate(self, time: float, t: float, until: float) -> np.ndarray:
-        """Values at an instant within the step: linear between its ends, discrete ones held."""
-        return self._mixed(time, t, until, slice(None), self._plan.values)
 
     def _mixed(self, time: float, t: float, until: float, columns: slice, end: np.ndarray) -> np.ndarray:
         if until - time <= TIME_TOLERANCE:

@@ -185,7 +185,7 @@ class Component(_DifferentiableComponent):
         # says where it stands [s] while somebody else than Python steps it
         self.clock: Callable[[], float] | None = None
         self.log: _LogSwitch | None = None
-        self.call_statistics = _new_call_statistics()
+        self.call_statistics = {kind: CallStatistics() for kind in _KINDS}
         self.trespasses: dict[str, str] = {}
         self._numbers, self._call_numbers = LAST_CALL.numbers(name), dict[str, int]()
         self._call_note, self._step_number = LAST_CALL, self._numbers + STEP
@@ -364,8 +364,3 @@ class Component(_DifferentiableComponent):
 
 
 _KINDS = ("get", "set", "event", "save", "restore", "release")
-
-
-def _new_call_statistics() -> dict[str, CallStatistics]:
-    """Tallies of a component that has not been called yet."""
-    return {kind: CallStatistics() for kind in _KINDS}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import floor, inf
 from typing import Any
 
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
 from cosim.components.description import description_of_outputs
@@ -67,7 +67,10 @@ class NetworkOutputs(FMI3Component):
     ) -> None:
         self.settings, self.readers = settings, tuple(readers)
         self.sources = [_source(name, node.name, components) for node in settings.nodes for name in node.signals]
-        description = _description(settings, self.sources, components, self.readers)
+        variables = _outputs(settings, self.sources, components, self.readers)
+        description = description_of_outputs(
+            KIND, KIND, "A network", variables, modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True
+        )
         super().__init__(NAME, None, description, source="the network of the scenario", kind=KIND)
 
 
@@ -101,18 +104,6 @@ def _source(name: str, node: str, components: Mapping[str, Component]) -> tuple[
         names = [f"{component}.{element.name}" for element in elements]
         raise ScenarioError(f"{where}: {name} is an array; name its elements: {', '.join(names[:3])}, ...")
     return component, signal
-
-
-def _description(
-    settings: NetworkSettings,
-    sources: Sequence[tuple[str, str]],
-    components: Mapping[str, Component],
-    readers: Sequence[PacketReader],
-) -> ModelDescription:
-    variables = _outputs(settings, sources, components, readers)
-    return description_of_outputs(
-        KIND, KIND, "A network", variables, modelIdentifier=KIND, canHandleVariableCommunicationStepSize=True
-    )
 
 
 def _outputs(

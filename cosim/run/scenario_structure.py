@@ -107,7 +107,7 @@ def _make_part(
         tuple(_port(component, v, taken) for v in inputs),
         tuple(_port(component, v, used, None if v.name in silent else tuple(table.get(v.name, ()))) for v in outputs),
         tuple(component.events),
-        _abilities(component),
+        tuple(text for flag, text in _ABILITIES.items() if getattr(component.capabilities, flag)),
         group,
         rate,
         tuple(chain),
@@ -126,21 +126,11 @@ def _connected(
     return taken, used
 
 
-def _abilities(component: Component) -> tuple[str, ...]:
-    """Capabilities that the component declares and a master can use, in words."""
-    return tuple(text for flag, text in _ABILITIES.items() if getattr(component.capabilities, flag))
-
-
 def _rate_text(every: int, substeps: int) -> str:
     """How often a component is stepped, in words; empty for once in every communication step."""
     if every > 1:
         return f"every {every} steps"
     return f"{substeps} in each step" if substeps > 1 else ""
-
-
-def _group_index(groups: Iterable[Sequence[str]]) -> Mapping[str, int]:
-    """Number of the group of each component."""
-    return {name: i for i, group in enumerate(groups) for name in group}
 
 
 def _port(
@@ -269,7 +259,7 @@ def _structure(task: RunTask, coupled: Coupled, groups: Sequence[Group], balises
     choice, refusal = _choice(table, groups, components)
     order = [n for group in groups for n in group.names]
     loops = [loop for group in groups for loop in group.algebraic]
-    number = _group_index(group.names for group in groups)
+    number = {name: i for i, group in enumerate(groups) for name in group.names}
     rates = {n: _rate_text(t.every, t.substeps) for n, t in table.components.items()}
     chains = _movement_chains(table, coupled, order, choice, balises)
     return Structure(

@@ -247,14 +247,10 @@ def make_sweep(
                 _check_parameters(varied, [*names, *sweep.names])
             cases.add(settings.get(CASE))
         except CosimError as error:
-            error.args = (f"vary: run {number} ({_settings_text(settings)}): {error}", *error.args[1:])
+            changed = ", ".join(f"{name} = {value!r}" for name, value in settings.items())
+            error.args = (f"vary: run {number} ({changed}): {error}", *error.args[1:])
             raise
     return sweep
-
-
-def _settings_text(settings: Mapping[str, Any]) -> str:
-    """Settings in one line."""
-    return ", ".join(f"{name} = {value!r}" for name, value in settings.items())
 
 
 def _check_parameters(scenario: RunnableScenario, names: Iterable[str]) -> None:

@@ -131,7 +131,8 @@ def common_quadratic_form(condition: QuadraticCondition) -> QuadraticForm | None
     n = condition.M.shape[1]
     rows, size = _inequality_rows(condition), n * (n + 1) // 2
     margin_column = np.tile(_pack(np.eye(n)), len(condition.w))[:, None]
-    positive = np.hstack([-_svec_scaling(n), np.zeros((size, 1))])
+    scaling = np.diag([1.0 if i == j else sqrt(2.0) for i, j in _upper(n)])
+    positive = np.hstack([-scaling, np.zeros((size, 1))])
     trace = np.append(_pack(np.eye(n)), 0.0)[None]
     matrix = np.vstack([trace, positive, np.hstack([rows, margin_column])])
     solution = _solve(matrix, n, len(condition.w))
@@ -218,10 +219,6 @@ def _pack(matrix: np.ndarray) -> np.ndarray:
 
 def _pack_all(matrices: np.ndarray, n: int) -> np.ndarray:
     return np.stack([matrices[:, i, j] * (1.0 if i == j else sqrt(2.0)) for i, j in _upper(n)], axis=1)
-
-
-def _svec_scaling(n: int) -> np.ndarray:
-    return np.diag([1.0 if i == j else sqrt(2.0) for i, j in _upper(n)])
 
 
 def _unpack(entries: np.ndarray, n: int) -> np.ndarray:

@@ -200,7 +200,8 @@ class _Compared(NamedTuple):
 
 
 def _compared(m: Any, reading: Reading, p: Any) -> _Compared:
-    rolls = indicator(np.abs(reading.odometer - m.last_odometer) <= _rolling_limit(p)) * indicator(m.samples > 0.0)
+    rolling = p.acceleration_limit * p.odometer_period + 2.0 * p.odometer_noise  # largest change of a rolling wheel
+    rolls = indicator(np.abs(reading.odometer - m.last_odometer) <= rolling) * indicator(m.samples > 0.0)
     size = np.abs(reading.residual)
     sign = indicator(reading.effort > 0.0) - indicator(reading.effort < 0.0)
     effort_time = np.where(sign * m.effort_time > 0.0, m.effort_time, 0.0) + sign * p.odometer_period
@@ -309,11 +310,6 @@ def certain_fault(p: Any) -> Array:
     ``eps' / M + nu``. At ``eps' / M`` one in two is.
     """
     return doubt_limit(p) / p.residual_gain + p.odometer_noise
-
-
-def _rolling_limit(p: Any) -> Array:
-    """Largest change between two readings of a rolling wheel [m/s]: ``a_max period + 2 noise``."""
-    return p.acceleration_limit * p.odometer_period + 2.0 * p.odometer_noise
 
 
 def _way_limit(passing: Passing, p: Any) -> Array:

@@ -103,7 +103,8 @@ class GapCertified(EvaluatedObserver):
 
     def deciding_parameters(self) -> tuple[Signal, ...]:
         """Those that decide stability: all but the timing, unless a subclass knows better."""
-        return tuple(s for s in self.parameters if s.name != "sample_period" and not _is_gate_parameter(s))
+        others = {"sample_period", *(s.name for s in GATE_PARAMETERS)}
+        return tuple(s for s in self.parameters if s.name not in others)
 
     def deciding_values(
         self, parameters: Mapping[str, Value] | None = None, preset: str | None = None
@@ -151,8 +152,3 @@ class GapCertified(EvaluatedObserver):
 
     def _of_gaps(self, gap: float, values: np.ndarray) -> Finding:
         return self.gap_finding(float(gap), self.unpack_parameters(values))
-
-
-def _is_gate_parameter(signal: Signal) -> bool:
-    """Whether a parameter is one of the gate, which no question of stability depends on."""
-    return signal.name in {s.name for s in GATE_PARAMETERS}

@@ -164,15 +164,10 @@ def _front(description: ModelDescription) -> dict[str, bytes]:
     name = library_name(identifier)
     with tempfile.TemporaryDirectory(prefix="fmus-hosted-") as place:
         folder = Path(place)
-        _write(_front_sources(), folder)
+        _write({entry.name: entry.read_bytes() for entry in (files("fmus.hosted") / "front").iterdir()}, folder)
         (folder / "hosted_model.h").write_text("".join(f"#define {key} {value}\n" for key, value in header.items()))
         binary = compile_library(find_compiler(), folder, [MAIN_SOURCE], name).read_bytes()
     return {f"binaries/{host_platform().fmi2_folder}/{name}": binary}
-
-
-def _front_sources() -> dict[str, bytes]:
-    """The C files of the front, by name."""
-    return {entry.name: entry.read_bytes() for entry in (files("fmus.hosted") / "front").iterdir()}
 
 
 def _papers(description: ModelDescription, source: Source) -> dict[str, bytes]:

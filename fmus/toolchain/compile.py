@@ -102,7 +102,10 @@ def cross_compiler(platform: Platform) -> Compiler:
             "Without it, --platform host builds for this machine with the system's compiler."
         )
     return Compiler(
-        _zig_command(platform.target), _zig_version(), (*_ZIG_FLAGS, *_LINK_FLAGS[platform.system]), zig=True
+        (sys.executable, "-m", "ziglang", "cc", "-target", platform.target),
+        _zig_version(),
+        (*_ZIG_FLAGS, *_LINK_FLAGS[platform.system]),
+        zig=True,
     )
 
 
@@ -198,11 +201,6 @@ both.
 def _zig_is_installed() -> bool:
     """Whether the package ``ziglang`` can be found."""
     return find_spec("ziglang") is not None
-
-
-def _zig_command(target: str) -> tuple[str, ...]:
-    """Program and fixed arguments of the compiler for a target, e.g. ``x86_64-linux-gnu.2.17``."""
-    return (sys.executable, "-m", "ziglang", "cc", "-target", target)
 
 
 @cache

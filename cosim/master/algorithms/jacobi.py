@@ -8,7 +8,6 @@ from typing import Any
 
 from cosim.coupling.instants import followed
 from cosim.coupling.plan import Plan
-from cosim.coupling.planned import PlannedComponent
 from cosim.master.algorithms.algorithm import Algorithm
 
 
@@ -53,7 +52,8 @@ class Jacobi(Algorithm):
 
     def _move_together(self, pool: ThreadPoolExecutor, t: float, until: float) -> None:
         """Everybody arrives or fails before the first failure in the order of the plan is raised."""
-        apart = [_may_run_apart(step) for step in self.plan.steps]
+        # apart runs only the plain step of a sealed library: it touches its own instance and its own part of the values
+        apart = [step.component.kind != "block" and not step.taken_over for step in self.plan.steps]
         futures: dict[int, Future[None]] = {}
         for place, step in enumerate(self.plan.steps):
             if apart[place]:
@@ -65,13 +65,6 @@ class Jacobi(Algorithm):
         first = next((failures[place] for place in sorted(failures) if failures[place] is not None), None)
         if first is not None:
             raise first
-
-
-def _may_run_apart(step: PlannedComponent) -> bool:
-    """Only the plain step of a sealed library: it touches nothing but its own instance and its own part of the
-    values.
-    """
-    return step.component.kind != "block" and not step.taken_over
 
 
 def _failure(move: Callable[[float, float], None], t: float, until: float) -> Exception | None:

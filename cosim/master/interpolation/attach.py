@@ -24,7 +24,7 @@ def attach_interpolators(plan: Plan, method: Method | Literal["hold"]) -> Mappin
     Returns:
         By component, the interpolator that gives it its lines (see `interpolators`).
     """
-    givers = _givers(plan)
+    givers = [step for step in plan.steps for _ in range(step.columns.stop - step.columns.start)]
     return {s.component.name: _attach(s, plan, givers, method) for s in plan.steps if len(s.inputs)}
 
 
@@ -74,8 +74,3 @@ def _known(planned: PlannedComponent, plan: Plan, givers: list[PlannedComponent]
         names = [plan.signals[inputs.sources[place]].name.removeprefix(f"{name}.") for place in members]
         found.append(KnownInputs(places, recording.course(names), inputs.factors[places], inputs.offsets[places]))
     return found
-
-
-def _givers(plan: Plan) -> list[PlannedComponent]:
-    """The component that owns each column of the values."""
-    return [step for step in plan.steps for _ in range(step.columns.stop - step.columns.start)]
