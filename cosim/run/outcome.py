@@ -18,7 +18,9 @@ from cosim.evaluation.metrics import phase_metrics
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.evaluated import Evaluated, evaluated_table
 from cosim.report.live.live_page import PageVerdict
+from cosim.report.live.still_panels import still_panels
 from cosim.report.page.picture_files import Pictures
+from cosim.report.page.run_curves import run_panels, run_recording
 from cosim.report.page.run_verdict import observer_statuses, run_verdict
 from cosim.results.result import Result
 from cosim.results.results_folder import REPORT, remove_report, write_results
@@ -130,6 +132,13 @@ class Outcome(FirstScreen, Mapping[str, np.ndarray]):
             "\n".join([*warnings[:_WARNINGS], *more]),
             self._errors(replace(self.spec, phases=[])) or self.result.signals_table(),
         ]
+
+    def _picture_html(self) -> str:
+        """Speed and its errors, as on the page; of a plain coupling the signals that change."""
+        if not len(self.time):
+            return ""
+        recordings = [run_recording(self.result, self.spec)]
+        return still_panels(recordings, run_panels(self.result, self.spec), self.spec.evaluate_after)
 
     @property
     def verdict(self) -> PageVerdict:

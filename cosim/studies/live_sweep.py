@@ -36,8 +36,7 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
     Args:
         result: the runs. directory: where the page will stand, which its links are relative to.
     """
-    recordings, table = _recordings(result), _table(result)
-    names = list(dict.fromkeys(curve.name for recording in recordings for curve in recording.curves))
+    (recordings, panels), table = measured_curves(result), _table(result)
     links, folders = [_link(run, directory) for run in result.runs], [_folder(run, directory) for run in result.runs]
     click = "see its page" if any(links) else "see how its page is made" if any(folders) else ""
     about = f"What was varied: {', '.join(result.names)}. Drag on an axis to choose runs."
@@ -48,12 +47,23 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
         finding=_finding(result),
         lead=about + more,
         recordings=recordings,
-        panels=[PagePanel(name, [name], is_shown=place < _SHOWN) for place, name in enumerate(names)],
+        panels=panels,
         sections=[
             Section("Runs", [Rows(table, links, folders)], is_open=True),
             Section("What failed", [result.troubles()], mood="bad"),
         ],
     )
+
+
+def measured_curves(result: SweepRuns) -> tuple[list[PageRecording], list[PagePanel]]:
+    """Measures over what was varied, and the panels that show them.
+
+    Args:
+        result: the runs.
+    """
+    recordings = _recordings(result)
+    names = list(dict.fromkeys(curve.name for recording in recordings for curve in recording.curves))
+    return recordings, [PagePanel(name, [name], is_shown=place < _SHOWN) for place, name in enumerate(names)]
 
 
 def _folder(run: SweepRun, directory: Path) -> str | None:

@@ -17,7 +17,8 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.run.signal_roles import report_spec
 from cosim.runs.engine import Progress
 from cosim.studies.measures import error_measures
-from fmus.tables.table import Table
+from fmus.tables.line_picture import Line, line_picture
+from fmus.tables.table import Parts, Readable, Table
 
 if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
@@ -47,7 +48,7 @@ class SeedRow:
 
 
 @dataclass
-class SeedStudy:
+class SeedStudy(Readable):
     """Maximal speed errors of every observer in every phase, one for each seed.
 
     Args:
@@ -109,9 +110,20 @@ class SeedStudy:
         failed = [f"seed {seed} failed: {why}" for seed, why in self.failures.items()]
         return seed_table(self.rows(), f"Maximal speed error over {len(self.seeds)} seeds", failed)
 
-    def text(self) -> str:
-        """The same as plain text."""
-        return self.table().text()
+    def parts(self) -> Parts:
+        """The table."""
+        return [self.table()]
+
+    def _picture_html(self) -> str:
+        """The errors of each observer over the seeds, in the first phase."""
+        phase = next((phase for _, phase in self.errors), "")
+        seeds = np.array(self.seeds, dtype=float)
+        lines = [
+            Line(self.spec.labels.get(observer, observer), seeds, np.array(errors))
+            for (observer, of), errors in self.errors.items()
+            if of == phase and len(errors) == len(seeds)
+        ]
+        return line_picture(f"Maximal speed error, {phase} [m/s]", lines, "seed")
 
     def to_data(self) -> dict[str, Any]:
         """Plain data: the seeds that ended, the quartiles, and a row for each seed."""

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.comparison.compare import compare
 from cosim.errors import ComparisonError
+from cosim.report.live.still_panels import still_panels
 from cosim.report.page.picture_files import Pictures
+from cosim.studies.live_sweep import measured_curves
 from cosim.studies.sweep_files import write_figures, write_sweep
 from cosim.studies.sweep_runs import SweepRuns
 
@@ -19,6 +21,10 @@ if TYPE_CHECKING:
 
 class SweepResult(SweepRuns):
     """The runs of a sweep, in order of its variations; arguments as for `SweepRuns`."""
+
+    def _picture_html(self) -> str:
+        """The first measures over what was varied, as on the page."""
+        return still_panels(*measured_curves(self))
 
     def compare(self, reference: int = 0, tolerance: Any = None, **options: Any) -> dict[int, Comparison]:
         """Compare every other run with one of them.

@@ -101,8 +101,13 @@ class FirstScreen:
         more = [f"... and {len(lines) - SCREEN_LINES} more lines"] if len(lines) > SCREEN_LINES else []
         return "\n".join([*lines[:SCREEN_LINES], *more])
 
+    def _picture_html(self) -> str:
+        """What a notebook shows behind the first sentence: curves, where there are any."""
+        return ""
+
     def _repr_html_(self) -> str:
-        return "".join(part.html() if isinstance(part, Table) else paragraph_html(part) for part in self._screen())
+        shown = [part.html() if isinstance(part, Table) else paragraph_html(part) for part in self._screen()]
+        return "".join([*shown[:1], self._picture_html(), *shown[1:]])
 
 
 SCREEN_WIDTH, SCREEN_LINES, SCREEN_ROWS = 100, 40, 16

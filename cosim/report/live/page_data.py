@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import isfinite
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 
 from cosim.report.live.live_page import LivePage, Mark, PageCurve, PagePanel, PageRecording
 from cosim.report.live.packed_column import INSTANTS, PackedColumn, pack
+from fmus.tables.line_picture import extreme_rows
 from fmus.tables.plain_data import jsonable
 
 ROOM = 2_200_000
@@ -108,25 +108,6 @@ class _Packer:
         self.room -= packed.size
         self.blocks += [packed.text, packed.odd]
         return packed.data() | {"block": len(self.blocks) - 2}
-
-
-def extreme_rows(values: np.ndarray, pieces: int) -> np.ndarray:
-    """Rows that keep the course of a curve: of each piece the first, the last, the smallest and the largest.
-
-    Args:
-        values: shape (rows,). pieces: how many.
-
-    Returns:
-        Numbers of rows, increasing.
-    """
-    edges = np.unique(np.linspace(0, len(values), pieces + 1).astype(int))
-    low, high = np.where(np.isnan(values), np.inf, values), np.where(np.isnan(values), -np.inf, values)
-    kept = [
-        row
-        for a, b in pairwise(edges)
-        for row in (a, a + int(np.argmin(low[a:b])), a + int(np.argmax(high[a:b])), b - 1)
-    ]
-    return np.unique(np.array(kept, dtype=int))
 
 
 def _ascends(values: np.ndarray) -> bool:

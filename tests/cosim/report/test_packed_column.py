@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from cosim.report.live.live_page import LivePage, PageCurve, PagePanel, PageRecording, PageVerdict
 from cosim.report.live.packed_column import INSTANTS, PackedColumn, pack
-from cosim.report.live.page_data import extreme_rows, page_data
+from cosim.report.live.page_data import page_data
 from cosim.report.live.render import live_page
+from fmus.tables.line_picture import extreme_rows
 
 VALUES = st.lists(
     st.one_of(

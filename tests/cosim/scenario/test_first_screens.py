@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+from html import escape
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from small_scenarios import small
 
 import cosim
+from cosim import studies
 from cosim.errors import OutputError
 from cosim.runs.run import Run
 from fmus.cli.progress import ProgressBar, reported
@@ -202,6 +204,24 @@ def test_a_bar_waits_until_it_is_worth_it(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_package_lists_what_it_offers(package: str) -> None:
     module = sys.modules[package]
     assert set(module.__all__) <= set(dir(module))
+
+
+def test_values_show_their_curves_in_a_notebook(outcome: cosim.Outcome) -> None:
+    """Nothing runs there, and it is small."""
+    heavier = small().set("locomotive.mass", 95e3).run(warn=lambda _: None)
+    sweep = small().vary({"observer.estimated_speed": [9.0, 10.0, 11.0]}).run()
+    values: list[tuple[Any, int, list[str]]] = [
+        (outcome, 2, ["Speed [m/s]", "Speed error [m/s]"]),
+        (cosim.compare(outcome, heavier), 2, ["Error of "]),
+        (sweep, 2, ["observer.estimated_speed [m/s]", "observer.speed_error_max [m/s]"]),
+        (studies.seed_study(small(), range(3), None), 1, ["Maximal speed error, "]),
+    ]
+    for value, figures, titles in values:
+        html = value._repr_html_()
+        assert [title for title in titles if escape(title) not in html] == []
+        assert html.count("<figure") == figures
+        assert "<script" not in html
+        assert len(html) < 200_000
 
 
 def test_a_comparison_shows_its_verdict_and_the_signals_that_differ(outcome: cosim.Outcome) -> None:
