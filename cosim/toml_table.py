@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator
 
-from plant_models.hybrid.meant_number import meant_number
 from plant_models.hybrid.noise import FROM_NAME, SEED_EXPECTED, is_seed
+from plant_models.meant_number import meant_number
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 """Name of a component."""

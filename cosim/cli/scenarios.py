@@ -13,7 +13,7 @@ from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
 from fmus.cli.parsers import no_number
 from fmus.cli.progress import SIMULATED_TIME, ProgressBar
-from plant_models.hybrid.meant_number import meant_number
+from plant_models.meant_number import meant_number
 
 
 def load_scenario(options: argparse.Namespace, loaded: Scenario | None = None) -> Scenario:

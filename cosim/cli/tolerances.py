@@ -16,7 +16,7 @@ from cosim.errors import ComparisonError, nearest
 from cosim.scenario.toml_file import read_toml
 from fmus.cli.commands import argument, repeated
 from fmus.cli.parsers import no_number
-from plant_models.hybrid.meant_number import meant_number
+from plant_models.meant_number import meant_number
 
 Asked = tuple[dict[str, Any], dict[str, Any], list[str]]
 """Keys of the default tolerance, tolerances by signal or pattern, and what to ignore."""

@@ -13,11 +13,11 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from cosim.components.described import DescribedComponent
+from cosim.components.meant_in_unit import meant_in_unit
 from cosim.errors import CouplingError, nearest
 from fmus.fmi.elements import described
 from fmus.fmi.types import CTYPES, FLOATING_TYPES, NUMERIC_TYPES, enumeration_items, size
 from fmus.fmi.units import Units
-from plant_models.hybrid.meant_number import meant_number
 
 Scalar = float | int | bool | str | bytes
 StartValue = Scalar | list[Scalar]
@@ -153,7 +153,9 @@ def _typed(variable: ModelVariable, value: Any) -> Scalar:
         return _item(value, enumeration_items(variable))
     if kind in _WHOLE_TYPES:
         return _whole(kind, value)
-    meant = meant_number(value, Units.name(variable) or "") if kind in FLOATING_TYPES and isinstance(value, str) else ""
+    meant = (
+        meant_in_unit(value, Units.name(variable) or "") if kind in FLOATING_TYPES and isinstance(value, str) else ""
+    )
     number = f"a number{meant}" if meant else "a number, or a list of numbers for a vector"
     raise ValueError(f"expected {_EXPECTED.get(kind, number)} (got {value!r})")
 
@@ -167,7 +169,7 @@ def _floating(kind: str, value: float) -> float:
 
 def _whole(kind: str, value: Any) -> int:
     if not (isinstance(value, (bool, int)) or (isinstance(value, float) and value.is_integer())):
-        meant = meant_number(value, whole=True) if isinstance(value, str) else ""
+        meant = meant_in_unit(value, whole=True) if isinstance(value, str) else ""
         raise ValueError(f"expected a whole number for a {kind}{meant} (got {value!r})")
     _, _, dtype = CTYPES.get(kind, CTYPES["Int64"])
     low, high = np.iinfo(dtype).min, np.iinfo(dtype).max

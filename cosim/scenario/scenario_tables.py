@@ -14,8 +14,8 @@ from cosim.results.formats.known_formats import FORMATS
 from cosim.scenario.model_name import Model
 from cosim.toml_table import Name, OwnSeed, TomlTable
 from fmu_observer.event_protocol import LatePolicy
-from plant_models.hybrid.meant_number import meant_number
 from plant_models.hybrid.noise import FROM_NAME, OWN_SEED_EXPECTED
+from plant_models.meant_number import meant_number
 
 
 class _Seed(float):

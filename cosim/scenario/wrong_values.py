@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from cosim.components.meant_in_unit import meant_in_unit
 from cosim.errors import nearest
-from plant_models.hybrid.meant_number import meant_number
 
 _CHOICE = re.compile(r"'([^']*)'")
 _NUMBER, _WHOLE = "expected a number", "expected a whole number"
@@ -55,4 +55,4 @@ def wrong_value(item: Mapping[str, Any]) -> str:
     expected = _KINDS.get(kind, str(item["msg"]))
     if not isinstance(stated, str) or expected not in (_NUMBER, _WHOLE):
         return expected
-    return expected + meant_number(stated, whole=expected == _WHOLE)
+    return expected + meant_in_unit(stated, whole=expected == _WHOLE)

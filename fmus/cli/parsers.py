@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 from fmus.cli.colour import coloured
 from fmus.plain import plain
+from plant_models.meant_number import meant_number
 
 MISTAKE = 2
 """Exit code of a mistake on the command line."""
@@ -98,8 +99,6 @@ def no_number(text: str, *, whole: bool = False) -> str:
     Args:
         text: as it was typed. whole: whether a whole number was expected.
     """
-    from plant_models.hybrid.meant_number import meant_number  # noqa: PLC0415 - only for mistakes
-
     kind = "a whole number" if whole else "a number"
     return f"expected {kind}{meant_number(text, whole=whole) or ('' if whole else ', such as 0.1')} (got {text!r})"
 

@@ -1,10 +1,11 @@
-"""What number a text means that stands in place of one: with a decimal comma, or with a unit behind it."""
+"""What number a text means that stands in place of one: with a decimal comma, or with a unit behind it. Standard
+library only.
+"""
 
 from __future__ import annotations
 
 import re
-
-from plant_models.hybrid.units import UnitError, conversion, parse_unit
+from collections.abc import Callable
 
 _WHOLE = r"[-+]?(?:\d{1,3}(?:\.\d{3})+(?=,)|\d{1,3}(?:\.\d{3}){2,}|\d{1,3}(?:[' \u202f]\d{3})+|\d+)"
 """German, Swiss or French: marks or blanks between thousands; a single point may be that of a decimal number."""
@@ -16,12 +17,16 @@ _MEANT = [re.compile(rf"\s*{number}{_UNIT}\s*") for number in (_GROUPED, _NUMBER
 _NO_DIGIT = re.compile(r"[^\d+-]")
 
 
-def meant_number(stated: str, unit: str = "", *, whole: bool = False) -> str:
+def _without_unit(value: float, _unit: str) -> str:
+    return f" without its unit: {value:.10g}"
+
+
+def meant_number(stated: str, *, whole: bool = False, with_unit: Callable[[float, str], str] = _without_unit) -> str:
     """What to write in place of a text, as the end of a sentence that begins with 'expected a number'.
 
     Args:
-        stated: the text. unit: name of the unit in which the number is expected; empty for SI units, or for none.
-        whole: whether a whole number is expected, which has no unit.
+        stated: the text. whole: whether a whole number is expected, which has no unit.
+        with_unit: what to say of a number and the name of the unit behind it.
 
     Returns:
         Empty where the text means no number.
@@ -35,7 +40,7 @@ def meant_number(stated: str, unit: str = "", *, whole: bool = False) -> str:
     if whole:
         return _whole(float(written), found)
     if found["unit"]:
-        return _without_unit(float(written), found["unit"], unit)
+        return with_unit(float(written), found["unit"])
     if digits != found["whole"]:
         return f"; write {written}, with a point and no marks between thousands"
     return f"; write a point in place of the comma: {written}" if found["mark"] == "," else ""
@@ -47,13 +52,3 @@ def _whole(value: float, found: re.Match[str]) -> str:
     if value.is_integer():
         return f"; write {value:.0f}" + (f" without {its}" if marks else ", with digits alone")
     return f"; with {its} it means {value:g}" if marks else f"; {value:g} is none"
-
-
-def _without_unit(value: float, stated: str, unit: str) -> str:
-    expected = f"in {unit}" if unit else "in SI units"
-    try:
-        source = parse_unit(stated.replace("km/h", "km.h-1"))
-        factor, offset = conversion(source, parse_unit(unit)) if unit else (source.factor, source.offset)
-    except UnitError:
-        return f" without a unit, {expected}"
-    return f" without its unit, {expected}: {value * factor + offset:.10g}"
