@@ -31,7 +31,7 @@ FIGURE_FILES = argument(
     metavar="KIND",
     help="draw figures as files, too, in figures beside the page: png (default) or svg",
 )
-QUIET = argument("--quiet", action="store_true", help="no progress bar")
+QUIET = argument("--quiet", action="store_true", help="no progress")
 PARAMETERS_FILE = argument("--toml", type=Path, metavar="FILE", help="write the parameters for a scenario")
 
 

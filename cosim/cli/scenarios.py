@@ -37,7 +37,7 @@ def simulated_time_bar(*, silent: bool) -> ProgressBar:
     Args:
         silent: whether it stays away in any case.
     """
-    return ProgressBar(silent=silent, shape=SIMULATED_TIME)
+    return ProgressBar("simulated second", silent=silent, shape=SIMULATED_TIME)
 
 
 def parse_setting(text: str) -> tuple[str, Any]:

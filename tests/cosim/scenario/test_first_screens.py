@@ -230,3 +230,20 @@ def test_a_comparison_shows_its_verdict_and_the_signals_that_differ(outcome: cos
     text = fits(cosim.compare(outcome, other))
     assert text.startswith("result DIFFERS from reference: ")
     assert "locomotive.speed" in text
+
+
+def test_where_nobody_sees_a_bar_there_is_a_line_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr("fmus.cli.progress_lines.monotonic", lambda: now)
+    monkeypatch.setattr(sys, "stderr", shown := io.StringIO())
+    bars = [ProgressBar("run"), ProgressBar("run", silent=True), ProgressBar("run", lines_after=0.0)]
+    for seconds, done in ((0.0, 0), (14.0, 1), (16.0, 2), (31.0, 3), (45.0, 4), (47.0, 5)):
+        now = 100.0 + seconds
+        for bar in bars:
+            bar(done, 9, "one by one")
+    assert shown.getvalue().splitlines() == [
+        "0 of 9 runs done after 0 s: one by one",
+        "2 of 9 runs done after 16 s: one by one",
+        "3 of 9 runs done after 31 s: one by one",
+        "5 of 9 runs done after 47 s: one by one",
+    ]
