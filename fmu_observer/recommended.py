@@ -7,7 +7,8 @@ from collections.abc import Mapping
 RECOMMENDED: Mapping[str, str] = {
     "quasi_lpv_uio": "effort, an odometer whose wheel may jam or spin, balises at any distance; mass and Davis "
     "coefficients known",
-    "differentiator_cdo": "effort, a fast odometer, balises every 1.5 s and denser: slip does not bias the speed",
+    "differentiator_cdo": "effort, a fast odometer, a balise every half second at all times: slip does not bias the "
+    "speed",
     "odometer_reset": "an odometer that can be trusted and balises, no effort: what any observer has to beat",
     "balise_odometer_ekf": "effort, an odometer and balises; it says how uncertain position and speed are",
     "takagi_sugeno_cdo": "effort, an odometer and balises; preset long_gaps is stable at any gap",

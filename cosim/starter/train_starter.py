@@ -17,7 +17,8 @@ from fmus.fmi.capabilities import read_capabilities
 
 PLANT, OBSERVER = "plant", "observer"
 DEFAULT_OBSERVER, WITHOUT_EFFORT, DENSE = "quasi_lpv_uio", "odometer_reset", "differentiator_cdo"
-"""What a stranger gets: beside an effort, without one, and for balises every 1.5 s and denser."""
+"""What a stranger gets beside an effort, and without one; and what is far better with a balise every half second at all
+times, which no FMU says and no train has that starts from standstill, so it is named only."""
 HORIZON, STEP, SHORTEST, LONGEST = 60.0, 0.01, 1e-3, 0.5
 RADIUS, PERIOD = 0.5, 0.01
 PRESETS = {"takagi_sugeno_cdo": "long_gaps"}
