@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from cosim.choice.allowance import Allowance
 from cosim.choice.benchmark_scores import BenchmarkScores
-from cosim.choice.candidates import BenchmarkCandidate, find_candidates
+from cosim.choice.candidates import BenchmarkCandidate, Observers, find_candidates
 from cosim.choice.disturbances import Disturbance, Journey
 from cosim.choice.disturbed_playback import believing, channels, disturbed
 from cosim.choice.known_parameters import derived_parameters, stated_parameters, true_signals
@@ -37,6 +37,7 @@ from cosim.simulation.scenario import Scenario
 from fmu_observer.certificates.finding import Finding
 
 Progress = Callable[[str, int, int], None]
+Notify = Callable[[str], None]
 _MICROSECONDS = 1e6
 
 
@@ -60,7 +61,7 @@ class ObserverBenchmark(BenchmarkScores):
 
 def benchmark_observers(
     scenario: Scenario,
-    observers: Sequence[Any] | None = None,
+    observers: Observers = None,
     *,
     record: str | Path | None = None,
     recorded: str | Path | None = None,
@@ -68,15 +69,16 @@ def benchmark_observers(
     disturb: Callable[[Journey], Disturbance] | None = None,
     allowance: Allowance | None = None,
     progress: Progress | None = None,
-    warn: Callable[[str], None] | None = None,
+    warn: Notify | None = None,
+    building: Notify | None = None,
 ) -> ObserverBenchmark:
     """Run the plant side of a scenario once and play it back to several observers, all of them beside one recording.
 
     Args:
         scenario: with or without observers of its own.
         observers: names of components of the scenario or of shipped observers, with a preset as ``name:preset``,
-            ``file.py:Class``, classes or instances. None: the scenario's own, and every preset of all shipped train
-            observers whose inputs and event the scenario can serve.
+            ``file.py:Class``, classes or instances; or a mapping of names to these. None: the scenario's own, and every
+            preset of all shipped train observers whose inputs and event the scenario can serve.
         record: folder for the recording, an ordinary results folder; by default it is thrown away.
         recorded: folder of an earlier recording (or of any run of this scenario) to be played back instead of a new
             run.
@@ -86,6 +88,7 @@ def benchmark_observers(
         allowance: what a position may be off; None for SUBSET-041.
         progress: called with what is done now, the number done and the number in all.
         warn: receives what is doubtful about the recorded run.
+        building: receives the models that are compiled for the first time; by default the log ``cosim``.
 
     Returns:
         Scores; an observer that fails is among them with the reason.
@@ -108,7 +111,7 @@ def benchmark_observers(
         report("recording", 0, total)
         folder = Path(recorded or record or scratch)
         if recorded is None:
-            _record(recording_scenario(scenario, parts), folder, warn, keep=record is not None)
+            _record(recording_scenario(scenario, parts), folder, warn, building, keep=record is not None)
         result = load_result(folder)
         known = derived_parameters(stated, parts, result)
         candidates, notes = find_candidates(scenario, parts, observers, known)
@@ -120,6 +123,7 @@ def benchmark_observers(
             repeat,
             partial(disturbed, found=channels(wrong, parts, known), disturbance=wrong),
             lambda what, done: report(what, min(done + 1, total), total),
+            building,
         )
         interrupted = _run(runs, [believing(candidate, wrong) for candidate in candidates])
         report("done", total, total)
@@ -170,9 +174,9 @@ def _spec_of_all(title: str, outcomes: Iterable[Outcome]) -> ReportSpec:
     return ReportSpec(**{**vars(spec), "title": title, "observers": []})
 
 
-def _record(scenario: Scenario, folder: Path, warn: Callable[[str], None] | None, *, keep: bool) -> None:
+def _record(scenario: Scenario, folder: Path, warn: Notify | None, building: Notify | None, *, keep: bool) -> None:
     """Run the plant side and write it; where the folder is kept, also what a run left that did not end."""
-    outcome = scenario.run(warn=warn or (lambda _text: None), progress=False)
+    outcome = scenario.run(warn=warn or (lambda _text: None), progress=False, building=building)
     if keep or outcome.failure is None:
         write_results(outcome.result, folder, ("csv", "npy") if keep else ("npy",))
     if outcome.failure == INTERRUPTED:

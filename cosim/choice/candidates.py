@@ -4,7 +4,7 @@ knows of the train. Runs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +20,9 @@ from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
 from cosim.simulation.scenario import Scenario
 from plant_models.user_file import names_code
+
+Observers = Sequence[Any] | Mapping[str, Any] | None
+"""Who is asked for, in their order or by the names that they are to have; None for all."""
 
 
 @dataclass(frozen=True)
@@ -43,20 +46,23 @@ class BenchmarkCandidate(Listener):
 
 
 def find_candidates(
-    scenario: Scenario, parts: ScenarioParts, names: Sequence[Any] | None, known: Known | None = None
+    scenario: Scenario, parts: ScenarioParts, names: Observers, known: Known | None = None
 ) -> tuple[list[BenchmarkCandidate], list[str]]:
     """The observers to be evaluated, those that cannot listen here among them, and notes on what was assumed.
 
     Args:
         scenario: for messages. parts: of it.
-        names: those asked for, with a preset as ``name:preset``; None for those of the scenario and every preset of all
-            shipped train observers.
+        names: those asked for, with a preset as ``name:preset``, perhaps by names of their own; None for those of the
+            scenario and every preset of all shipped train observers.
         known: of the train; None for what the scenario says.
 
     Raises:
         ScenarioError: a name is neither an observer of the scenario nor a shipped one.
     """
     found = stated_parameters(scenario, parts) if known is None else known
+    if isinstance(names, Mapping):
+        named = [replace(_named(scenario, parts, asked, found), name=name) for name, asked in names.items()]
+        return named, [f"{c.name}: {text}" for c in named for text in c.settings]
     if names is not None:
         asked = {name if isinstance(name, str) else id(name): name for name in names}
         named = _distinct([_named(scenario, parts, name, found) for name in asked.values()])
@@ -103,6 +109,11 @@ def _named(scenario: Scenario, parts: ScenarioParts, stated: Any, known: Known) 
     model, _, preset = name.partition(":")
     if name.stated is None and preset and model in fmu_observer.OBSERVERS:
         return _shipped(parts, model, known, preset)
+    if name.stated is None and name.lower().endswith(".fmu"):
+        raise ScenarioError(
+            f"{scenario.where}: {name} is an FMU, and nothing says what it is connected to. Make it a component of the "
+            f"scenario and connect it (cosim new {name} shows how); all of the scenario's observers take part."
+        )
     if name.stated is None and not names_code(name) and name not in fmu_observer.OBSERVERS:
         others = [*parts.observers, *(n for n in train_observers() if n not in parts.observers)]
         raise ScenarioError(f"{scenario.where}: unknown observer {name!r}; {nearest(name, others)}")

@@ -36,7 +36,8 @@ _SHOWN = 8
 _CUT = 12
 """How many rows of a group a terminal shows; all stand on the page and in the data."""
 _SHARE = Column("share", "of allowance", "%", "Largest share of the allowance in all runs that count", factor=100.0)
-_HARDER = Column("harder", "harder", "%", "The same in harder runs, which do not count", factor=100.0)
+_HARDER = Column("harder", "harder", "%", "The same in runs twice as hard, which do not count", factor=100.0)
+_RUNS = Column("runs", "runs", "", "How many runs count for it")
 _RMS = error_column("rms_position_error", "rms p", "m", "Position error over all runs that count")
 _SPEED = error_column("rms_speed_error", "rms v", "m/s", "Speed error of the nominal run")
 _COST = Column("cost", "cost", "us/step", "Time in the observer per communication step", factor=1e6)
@@ -86,9 +87,9 @@ class Choice(Readable):
         end = INTERRUPTED if self.stopped == INTERRUPTED else "cut short"
         stopped = f"{end} after {len(self.disturbances)} runs; so far: " if self.stopped else ""
         if best.safe:
-            text = f"use {best.label}" + ("" if best.certified else " (nothing certifies it for these gaps)")
+            text = f"use {best.named}" + ("" if best.certified else " (nothing certifies it for these gaps)")
         else:
-            text = f"nothing is safe here, least bad {best.label}, because of {best.why_not(self._acting(best))}"
+            text = f"nothing is safe here, least bad {best.named}, because of {best.why_not(self._acting(best))}"
         return f"{stopped}{text}: {self._numbers(best)}{'' if self._corrected else _UNCORRECTED}"
 
     @property
@@ -119,9 +120,9 @@ class Choice(Readable):
         """A table for each group."""
         use, works, bad, left = self.groups.items()
         tables = [Table(key.replace(" ", "_"), _GOOD, [_good(r) for r in rows], key) for key, rows in (use, works)]
-        rows = [[r.label, r.share if isfinite(r.share) else None, r.why_not(self._acting(r))] for r in bad[1]]
+        rows = [[r.named, r.share if isfinite(r.share) else None, r.why_not(self._acting(r))] for r in bad[1]]
         tables.append(Table("not_for", [_NAME, _SHARE, _BECAUSE], rows, f"{bad[0]}, because"))
-        misfits = [[row.label, row.why_not()] for row in left[1]]
+        misfits = [[row.named, row.why_not()] for row in left[1]]
         return [*tables, Table("not_tried", [_NAME, _BECAUSE], misfits, left[0])]
 
     def lines(self) -> str:
@@ -172,8 +173,9 @@ class Choice(Readable):
         Raises:
             OutputError: the folder cannot be written.
         """
-        labels = {PLAIN, *(row.score.label for row in self.rows[:_SHOWN])}
-        shown = replace(self.benchmark, scores=tuple(s for s in self.benchmark.scores if s.label in labels))
+        best = {row.score.name: row for row in self.rows[:_SHOWN]}
+        names = {*best, *(row.score.name for row in self.rows if row.score.label == PLAIN)}
+        shown = replace(self.benchmark, scores=tuple(s for s in self.benchmark.scores if s.name in names))
         good = self.found and self.best.safe
         return write_benchmark(
             shown, directory, Answer(self.answer, good, self.tables(), self.to_data()), figures=figures
@@ -189,18 +191,19 @@ class Choice(Readable):
         if not isfinite(row.share):
             return "diverged"
         share = number(100.0 * row.share)
-        return f"at most {share} % of the allowance, position error {number(row.rms)} m rms"
+        return f"at most {share} % of the allowance in {len(row.used)} runs, position error {number(row.rms)} m rms"
 
     def _acting(self, row: Row) -> dict[str, str]:
         run, used = row.worst
         return {d.name: d.cause(used.time) for d in self.disturbances if d.name == run}
 
     def _done(self) -> str:
-        names = ", ".join(disturbance.name for disturbance in self.disturbances)
         tried = [row for row in self.rows if row.tried]
+        most, fewest = (at([len(row.used) for row in tried if not row.failures] or [1]) - 1 for at in (max, min))
         done = (
-            f"{len(tried)} observers on {names} of {self.benchmark.spec.title}. Allowance: {self.allowance.text}. "
-            "The harder run has disturbances of its own, drawn twice as large; it does not count."
+            f"{len(tried)} observers on {self.benchmark.spec.title}: nominally and on disturbed runs, {fewest} of "
+            f"them all, {most} the best. Allowance: {self.allowance.text}. Harder is each of the runs of all with "
+            "every disturbance twice as large; it does not count."
         )
         return "\n".join([done, *self._remarks()])
 
@@ -213,6 +216,8 @@ class Choice(Readable):
     def _row_data(self, row: Row) -> dict[str, Any]:
         return {
             "observer": row.label,
+            "same": list(row.also),
+            "runs": len(row.used),
             "safe": row.safe,
             "certified": row.certified,
             "share": row.share,
@@ -232,10 +237,18 @@ def _cut(table: Table) -> Table:
     return replace(table, rows=table.rows[:_CUT], notes=[*table.notes, f"likewise, or worse: {left}"])
 
 
-_GOOD = (_NAME, _SHARE, _HARDER, _RMS, _SPEED, _COST)
+_GOOD = (_NAME, _RUNS, _SHARE, _HARDER, _RMS, _SPEED, _COST)
 
 
 def _good(row: Row) -> list[Any]:
     harder = max((used.share for used in row.harder.values()), default=None)
     cost = row.score.cost
-    return [row.label, row.share, harder, row.rms, row.score.speed_rms, None if cost is None else 1e-6 * cost]
+    return [
+        row.named,
+        len(row.used),
+        row.share,
+        harder,
+        row.rms,
+        row.score.speed_rms,
+        None if cost is None else 1e-6 * cost,
+    ]

@@ -7,15 +7,18 @@ that moves nothing, a wrong mass is one in the observer, faults act on the odome
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 GRAVITY = 9.81  # [m/s2]
 _BRAKES, _PULLS = -0.1, -0.02  # accelerations below and above which a train brakes or pulls [m/s2]
 _MOVES = 2.0  # [m/s]: below this speed no fault is drawn
-_APART = 5.0  # least time between two faults [s]
+_APART = 5.0  # least time between two faults, longer than one of them: twice as long they are still apart [s]
+_BELIEVED = 1.8  # most that the error of a resistance is enlarged by, so that a resistance is left
 _MOST = 4  # faults of a kind in a run
+HARDER = "harder"
+"""What the names of those begin with that do not count."""
 _SIGNS = ((1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))
 """Of the errors of mass, resistance and wheel, for one seed after the other."""
 
@@ -79,6 +82,29 @@ class Disturbance:
     slopes: Sequence[Slope] = ()
     faults: Sequence[OdometerFault] = ()
 
+    def times(self, factor: float) -> Disturbance:
+        """The same, each part of it so many times as large, as far as it can be: a wheel is no slower than locked.
+
+        Args:
+            factor: at most 2 [1].
+        """
+        return replace(
+            self,
+            name=f"{HARDER} {self.name}",
+            mass=1.0 + factor * (self.mass - 1.0),
+            resistance=1.0 + min(factor, _BELIEVED) * (self.resistance - 1.0),
+            wheel=1.0 + factor * (self.wheel - 1.0),
+            noise=factor * self.noise,
+            loss=factor * self.loss,
+            slopes=[replace(slope, gradient=factor * slope.gradient) for slope in self.slopes],
+            faults=[replace(f, length=factor * f.length, depth=min(factor * f.depth, 1.0)) for f in self.faults],
+        )
+
+    @property
+    def harder(self) -> bool:
+        """Whether it is one of those that do not count."""
+        return self.name.startswith(HARDER)
+
     def cause(self, time: float) -> str:
         """What acts at an instant [s], in words.
 
@@ -95,7 +121,7 @@ class Disturbance:
         return ""
 
 
-def drawn(number: int, seed: int, journey: Journey, size: float = 1.0) -> Disturbance:
+def drawn(number: int, seed: int, journey: Journey) -> Disturbance:
     """A disturbance from a seed.
 
     Mass is wrong by 5 to 20 %, resistance by 10 to 50 %, the wheel by 0.3 to 1 %; readings have a noise of 0.02 to
@@ -104,30 +130,30 @@ def drawn(number: int, seed: int, journey: Journey, size: float = 1.0) -> Distur
     both of each.
 
     Args:
-        number: of the seed, from 1. seed: of the run. journey: of the train. size: factor of all of it.
+        number: of the seed, from 1. seed: of the run. journey: of the train.
     """
     rng = np.random.default_rng((seed, number))
     mass, resistance, wheel = _SIGNS[(number - 1) % len(_SIGNS)]
     return Disturbance(
-        name=f"seed {number}" if size == 1.0 else f"harder {number}",
-        mass=1.0 + size * mass * rng.uniform(0.05, 0.2),
-        resistance=1.0 + min(size, 1.8) * resistance * rng.uniform(0.1, 0.5),
-        wheel=1.0 + size * wheel * rng.uniform(0.003, 0.01),
-        noise=size * rng.uniform(0.02, 0.1),
-        loss=size * rng.uniform(0.05, 0.2),
-        slopes=_slopes(rng, journey, size),
-        faults=_faults(rng, journey, size),
+        name=f"seed {number}",
+        mass=1.0 + mass * rng.uniform(0.05, 0.2),
+        resistance=1.0 + resistance * rng.uniform(0.1, 0.5),
+        wheel=1.0 + wheel * rng.uniform(0.003, 0.01),
+        noise=rng.uniform(0.02, 0.1),
+        loss=rng.uniform(0.05, 0.2),
+        slopes=_slopes(rng, journey),
+        faults=_faults(rng, journey),
     )
 
 
-def _slopes(rng: np.random.Generator, journey: Journey, size: float) -> list[Slope]:
+def _slopes(rng: np.random.Generator, journey: Journey) -> list[Slope]:
     """Stretches of a tenth to a third of the track, at most 2 km, each with its own gradient, also on the way back."""
     place = journey.position - np.min(journey.position)
     track = float(np.max(place))
     edges = [0.0]
     while edges[-1] < track and len(edges) <= 2 * _MOST:
         edges.append(edges[-1] + min(rng.uniform(0.1, 0.33) * track, rng.uniform(500.0, 2000.0)))
-    gradients = size * 8e-3 * rng.uniform(-1.0, 1.0, len(edges))
+    gradients = 8e-3 * rng.uniform(-1.0, 1.0, len(edges))
     if len(edges) < 2:
         return []
     stretch = np.searchsorted(edges[1:-1], place, side="right")
@@ -140,7 +166,7 @@ def _slopes(rng: np.random.Generator, journey: Journey, size: float) -> list[Slo
     ]
 
 
-def _faults(rng: np.random.Generator, journey: Journey, size: float) -> list[OdometerFault]:
+def _faults(rng: np.random.Generator, journey: Journey) -> list[OdometerFault]:
     """Jams while the train brakes, skids while it pulls, in the order of time and apart from each other."""
     moving = np.abs(journey.speed) > _MOVES
     pace = _accelerations(journey)
@@ -148,8 +174,8 @@ def _faults(rng: np.random.Generator, journey: Journey, size: float) -> list[Odo
     skids = _instants(rng, journey.time[moving & (pace > _PULLS)], every=40.0)
     found: list[OdometerFault] = []
     for onset, kind in sorted([(t, -1.0) for t in jams] + [(t, 1.0) for t in skids]):
-        depth = rng.uniform(0.3, 1.0) if kind < 0.0 else min(size * rng.uniform(0.1, 0.5), 1.0)
-        length = size * rng.uniform(0.5, 3.0)
+        depth = rng.uniform(0.3, 1.0) if kind < 0.0 else rng.uniform(0.1, 0.5)
+        length = rng.uniform(0.5, 3.0)
         if not found or onset > found[-1].onset + found[-1].length + _APART:
             found.append(OdometerFault(onset, float(length), float(depth), kind))
     return found

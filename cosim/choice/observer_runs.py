@@ -40,7 +40,8 @@ class ObserverRuns:
     Args:
         scenario: that was recorded. parts: of it. folder: with the results of the plant side.
         repeat: runs of each observer. disturb: changes the tables of each run.
-        progress: called with what is run now and the number of runs of an observer done.
+        progress: called with what is run now and the number of runs of an observer done. building: receives the
+            observers that are compiled for the first time.
         found: what is known so far, by observer; kept where somebody interrupts.
     """
 
@@ -50,6 +51,7 @@ class ObserverRuns:
     repeat: int
     disturb: Callable[[dict[str, Any]], dict[str, Any]]
     progress: Callable[[str, int], None]
+    building: Callable[[str], None] | None = None
     found: dict[str, ObserverRun] = field(default_factory=dict)
 
     def run(self, listeners: Sequence[Listener]) -> None:
@@ -87,7 +89,7 @@ class ObserverRuns:
 
     def _once(self, group: Sequence[Listener]) -> Outcome:
         outcome = playback_scenario(self.scenario, self.parts, self.folder, group, self.disturb).run(
-            warn=_ignore, progress=False
+            warn=_ignore, progress=False, building=self.building
         )
         if outcome.failure == INTERRUPTED:
             raise KeyboardInterrupt

@@ -14,6 +14,8 @@ from fmus.tables.numbers import number
 
 TIE = 0.1
 """Share of the allowance below which two observers do not differ [1]."""
+NEAR, MOST = 1.5, 8
+"""Factor of the best up to which another one may still be it, and how many of them run on further seeds."""
 NOTHING = UsedAllowance(inf, 0.0, inf, inf)
 """Of an observer that fails: more than there is."""
 
@@ -26,6 +28,7 @@ class Row:
         score: of the nominal run. candidate: how it is set. used: of the allowance, by the name of the run; those that
             count. harder: of the allowance in runs that do not.
         failures: why it failed, by the name of the run. remarks: what a run says of its preset beside this train.
+        also: labels of presets that are the same here.
     """
 
     score: ObserverScore
@@ -34,6 +37,12 @@ class Row:
     harder: Mapping[str, UsedAllowance] = field(default_factory=dict)
     failures: Mapping[str, str] = field(default_factory=dict)
     remarks: Sequence[str] = ()
+    also: Sequence[str] = ()
+
+    @property
+    def named(self) -> str:
+        """To show, with the presets that are the same."""
+        return " = ".join((self.label, *self.also))
 
     @property
     def label(self) -> str:
@@ -100,8 +109,10 @@ class Row:
             reasons += [next(iter(self.failures.values()))]
         elif not self.safe:
             acting = (causes or {}).get(run, "")
+            beyond = sum(one.share > 1.0 for one in self.used.values())
             text = f"{number(used.share)} times the allowance in {run} at {used.time:.0f} s"
-            reasons += [f"{text}, {acting}" if acting else text]
+            text += f", {acting}" if acting else ""
+            reasons += [f"{text} ({beyond} of {len(self.used)} runs beyond it)"]
         return "; ".join(reasons) if not self.safe else ""
 
 
@@ -111,7 +122,8 @@ def ranked(rows: Sequence[Row]) -> list[Row]:
     Safe ones come before all others, in the order of their errors; but those that differ by less than `TIE` of the
     allowance are as good: of those whose error is within it of the smallest the ones come first whose share of the
     allowance is within it of the smallest, of these presets that were not made for another train, and of these
-    certified ones. Of unsafe ones the share decides.
+    certified ones. Of unsafe ones those come first that had more runs, for they were safe until then; then the share
+    decides.
 
     Args:
         rows: in any order.
@@ -122,7 +134,7 @@ def ranked(rows: Sequence[Row]) -> list[Row]:
 
     def place(row: Row) -> tuple[Any, ...]:
         if not row.safe:
-            return 3, row.share, row.rms, row.label
+            return 3, -len(row.used), row.share, row.rms, row.label
         if row.rms > error:
             return 2, row.rms, row.share, row.label
         if row.share > share:
@@ -130,6 +142,20 @@ def ranked(rows: Sequence[Row]) -> list[Row]:
         return 0, bool(row.remarks), not row.certified, row.rms, row.label
 
     return [*sorted(tried, key=place), *(row for row in rows if not row.tried)]
+
+
+def contenders(rows: Sequence[Row]) -> list[Row]:
+    """The rows that may be the best ones, the best first: safe, and not far from it in their error; none where nothing
+    is safe.
+
+    Args:
+        rows: in any order.
+    """
+    safe = [row for row in ranked(rows) if row.safe]
+    if not safe:
+        return []
+    limit = max(NEAR * safe[0].rms, safe[0].rms + TIE * allowed(safe))
+    return [row for row in safe if row.rms <= limit][:MOST]
 
 
 def allowed(rows: Sequence[Row]) -> float:

@@ -9,16 +9,19 @@ from typing import Any
 
 from cosim.choice.allowance import Allowance
 from cosim.choice.choice import INTERRUPTED, Choice
-from cosim.choice.choose import SEEDS, choose, scenario_for_fmu
+from cosim.choice.choose import FURTHER, SEEDS, choose, scenario_for_fmu
 from cosim.cli.arguments import FIGURE_FILES, QUIET, settings_argument
+from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import load_scenario
-from cosim.errors import OutputError, RunError
+from cosim.errors import OutputError, RunError, ScenarioError
 from cosim.results.results_folder import check_writable
 from cosim.simulation.scenario import Scenario
 from fmus.cli.commands import argument, one_of
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from plant_models.hybrid.casadi_package import demand_casadi
+
+_SCENARIOS = (".toml", ".ssp")
 
 
 def _names(text: str) -> list[str]:
@@ -51,7 +54,14 @@ ARGUMENTS = (
         help="components of the scenario, shipped observers, NAME:PRESET or file.py:Class (default: the scenario's "
         "own, and every preset of all train observers)",
     ),
-    argument("--seeds", type=int, default=SEEDS, metavar="N", help=f"disturbed runs that count (default: {SEEDS})"),
+    argument("--seeds", type=int, default=SEEDS, metavar="N", help=f"disturbed runs of all (default: {SEEDS})"),
+    argument(
+        "--further",
+        type=int,
+        default=FURTHER,
+        metavar="N",
+        help=f"disturbed runs that the best get besides, to see what fails rarely (default: {FURTHER})",
+    ),
     argument(
         "--allowance",
         default=None,
@@ -82,7 +92,7 @@ def execute(options: argparse.Namespace) -> Output:
     for folder in (options.out, options.record):
         if folder is not None:
             check_writable(folder)
-    with ProgressBar("run", silent=options.quiet or options.json) as bar:
+    with ProgressBar("run", silent=options.quiet or options.json, lines_after=0.0) as bar:
         choice = _chosen(options, bar)
     files: dict[str, Path] = {}
     if options.write is not None and choice.found and not choice.stopped:
@@ -104,18 +114,27 @@ def _error(choice: Choice) -> BaseException | None:
 def _chosen(options: argparse.Namespace, bar: ProgressBar) -> Choice:
     more: dict[str, Any] = {
         "seeds": options.seeds,
+        "further": options.further,
         "allowance": None if options.allowance is None else Allowance.of(options.allowance),
         "record": options.record,
         "recorded": options.recorded,
         "workers": options.workers,
         "progress": lambda what, done, total: bar(done, total, what),
         "warn": logging.getLogger("cosim").warning,
+        "building": ignore if options.quiet else print_notice,
     }
     return choose(_scenario(options), options.observers, **more)
 
 
 def _scenario(options: argparse.Namespace) -> Scenario:
-    """The scenario that is named, or that of a starter for the FMU that is."""
-    if Path(options.scenario).suffix.lower() == ".fmu":
+    """The scenario that is named, or that of a starter for the FMU that is.
+
+    Raises:
+        ScenarioError: the file is neither.
+    """
+    file = Path(options.scenario)
+    if file.suffix.lower() == ".fmu":
         return load_scenario(options, scenario_for_fmu(options.scenario))
+    if file.is_file() and file.suffix.lower() not in _SCENARIOS:
+        raise ScenarioError(f"{file} is no scenario (.toml or .ssp) and no train (.fmu).")
     return load_scenario(options)

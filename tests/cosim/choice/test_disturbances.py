@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -30,11 +31,12 @@ def test_four_seeds_have_both_signs_of_every_error(way: Journey, seed: int) -> N
     assert {fault.kind for d in found for fault in d.faults} == {-1.0, 1.0}
 
 
-@given(JOURNEYS, st.integers(0, 10**6), st.integers(1, 9), st.sampled_from([1.0, 2.0]))
+@given(JOURNEYS, st.integers(0, 10**6), st.integers(1, 9), st.booleans())
 def test_wheels_jam_while_the_train_brakes_and_skid_while_it_pulls_one_at_a_time(
-    way: Journey, seed: int, number: int, size: float
+    way: Journey, seed: int, number: int, twice: bool
 ) -> None:
-    faults = drawn(number, seed, way, size).faults
+    found = drawn(number, seed, way)
+    faults = (found.times(2.0) if twice else found).faults
     for fault in faults:
         row = int(np.searchsorted(way.time, fault.onset))
         change = np.interp(way.time[row] + 0.5, way.time, way.speed) - np.interp(
@@ -55,6 +57,23 @@ def test_slopes_follow_one_another_to_the_end(way: Journey, seed: int, number: i
         assert slope.onset + slope.length == following.onset or abs(slope.onset + slope.length - following.onset) < 1e-9
     assert abs(slopes[-1].onset + slopes[-1].length - way.time[-1]) < 1e-9
     assert all(abs(slope.gradient) <= 8e-3 for slope in slopes)
+
+
+@given(JOURNEYS, st.integers(0, 10**6), st.integers(1, 9))
+def test_the_harder_one_is_the_same_with_everything_twice_as_large(way: Journey, seed: int, number: int) -> None:
+    found = drawn(number, seed, way)
+    harder = found.times(2.0)
+    assert (harder.name, harder.harder, found.harder) == (f"harder seed {number}", True, False)
+    for part in ("mass", "wheel"):
+        assert getattr(harder, part) - 1.0 == pytest.approx(2.0 * (getattr(found, part) - 1.0))
+    assert harder.resistance > 0.0
+    assert abs(harder.resistance - 1.0) > 1.7 * abs(found.resistance - 1.0)
+    assert (harder.noise, harder.loss) == (2.0 * found.noise, 2.0 * found.loss)
+    assert [s.gradient for s in harder.slopes] == [2.0 * s.gradient for s in found.slopes]
+    assert [(f.onset, f.length, f.kind) for f in harder.faults] == [
+        (f.onset, 2 * f.length, f.kind) for f in found.faults
+    ]
+    assert [f.depth for f in harder.faults] == [min(2.0 * f.depth, 1.0) for f in found.faults]
 
 
 @given(JOURNEYS, st.integers(0, 10**6))

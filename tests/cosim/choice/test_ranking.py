@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from cosim.choice.allowance import UsedAllowance
 from cosim.choice.observer_scores import ObserverScore, gap_certified
-from cosim.choice.ranking import TIE, Row, allowed, ranked
+from cosim.choice.ranking import MOST, NEAR, TIE, Row, allowed, contenders, ranked
+from cosim.choice.rows import merged
 
 ALLOWED = 10.0
 
@@ -24,7 +25,7 @@ def row(name: str, runs: list[tuple[float, float]], certified: bool, failed: boo
     score = ObserverScore(name, name, "m", "defaults", certificate=gap)
     return Row(
         score,
-        cast(Any, SimpleNamespace(name=name, origin="defaults")),
+        cast(Any, SimpleNamespace(name=name, origin="defaults", model="m")),
         used,
         {},
         failures,
@@ -61,7 +62,35 @@ def test_safe_ones_come_first_and_the_first_is_within_a_tie_of_the_smallest_erro
         assert found[0] in own
         assert found[0].certified == any(r.certified for r in own)
     else:
-        assert found[0].share == min(r.share for r in found)
+        assert found[0].share == min(r.share for r in found)  # all have the same number of runs
+
+
+@given(ROWS)
+def test_those_that_may_be_the_best_are_all_that_are_near_it(rows: list[Row]) -> None:
+    found, safe = contenders(rows), [r for r in ranked(rows) if r.safe]
+    near = [r for r in safe if r.rms <= max(NEAR * safe[0].rms, safe[0].rms + TIE * ALLOWED)]
+    assert found == near[:MOST]
+    assert found[:1] == safe[:1]
+
+
+@given(RUNS, RUNS)
+def test_what_was_safe_until_a_further_seed_comes_before_what_never_was(few: list[Any], more: list[Any]) -> None:
+    """However far beyond the allowance the further seed takes it: the other had no such seed."""
+    early = row("early", [(2.0, error) for _, error in few], False)
+    late = row("late", [*[(min(share, 1.0), error) for share, error in more], (9.0, 1.0)], False)
+    assert [r.label for r in ranked([early, late])] == ["late", "early"]
+
+
+@given(ROWS)
+def test_rows_of_the_same_numbers_are_one_and_every_label_is_there_once(rows: list[Row]) -> None:
+    found = merged(rows)
+    assert sorted(label for r in found for label in (r.label, *r.also)) == sorted(r.label for r in rows)
+    numbers = [tuple(r.used.items()) for r in found if not r.failures]
+    assert len(set(numbers)) == len(numbers)
+    for one in found:
+        same = [r for r in rows if r.label in one.also]
+        assert all(r.used == one.used for r in same)
+        assert not one.remarks or all(r.remarks for r in same)
 
 
 @given(RUNS, st.booleans())
@@ -77,5 +106,5 @@ def test_one_that_was_not_tried_comes_last() -> None:
     assert allowed([left, bad]) == ALLOWED
     assert bad.why_not({"seed 0": "after a wheel that jams at 3 s"}) == (
         "its gains are certified for gaps up to 0.100 s, here are 1.00 s; 9.00 times the allowance in seed 0 at 1 s, "
-        "after a wheel that jams at 3 s"
+        "after a wheel that jams at 3 s (1 of 1 runs beyond it)"
     )

@@ -40,7 +40,7 @@ LINES = {
         "calibrate": "calibrate running_resistance RESULTS --signals speed=locomotive.speed --set minimum_speed=0.1",
         "certify": "certify takagi_sugeno_cdo --no-simulation",
         "certify of a scenario": "certify TRAIN",
-        "choose": "choose TRAIN --observers takagi_sugeno_cdo,multirate_cdo --seeds 1 --out OUT",
+        "choose": "choose TRAIN --observers takagi_sugeno_cdo,multirate_cdo --seeds 1 --further 1 --out OUT",
         "compare": "compare RESULTS OTHER --verbose --html OUT.html --plots OUT",
         "export of a result": "export RESULTS OUT.npy",
         "export of a scenario": "export TRAIN OUT.ssp",
