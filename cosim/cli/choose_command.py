@@ -16,6 +16,7 @@ from cosim.cli.scenarios import load_scenario
 from cosim.errors import OutputError, RunError, ScenarioError
 from cosim.results.results_folder import check_writable
 from cosim.simulation.scenario import Scenario
+from fmus.cli.colour import Role
 from fmus.cli.commands import argument, one_of
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
@@ -99,7 +100,9 @@ def execute(options: argparse.Namespace) -> Output:
         files["scenario"] = choice.with_best().save(options.write)
     if options.out is not None:
         files |= choice.write(options.out, figures=options.figures)
-    return Output(choice.parts(), choice.to_data(), files, error=_error(choice))
+    verdict = choice.answer if choice.found else ""
+    role: Role = "good" if choice.found and choice.best.safe else "bad"
+    return Output(choice.parts(), choice.to_data(), files, error=_error(choice), verdict=verdict, role=role)
 
 
 def _error(choice: Choice) -> BaseException | None:
@@ -112,6 +115,10 @@ def _error(choice: Choice) -> BaseException | None:
 
 
 def _chosen(options: argparse.Namespace, bar: ProgressBar) -> Choice:
+    def notice(text: str) -> None:
+        bar.clear()
+        print_notice(text)
+
     more: dict[str, Any] = {
         "seeds": options.seeds,
         "further": options.further,
@@ -121,7 +128,7 @@ def _chosen(options: argparse.Namespace, bar: ProgressBar) -> Choice:
         "workers": options.workers,
         "progress": lambda what, done, total: bar(done, total, what),
         "warn": logging.getLogger("cosim").warning,
-        "building": ignore if options.quiet else print_notice,
+        "building": ignore if options.quiet else notice,
     }
     return choose(_scenario(options), options.observers, **more)
 
