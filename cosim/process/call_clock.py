@@ -35,4 +35,4 @@ class CallClock:
         limit = self._page.seconds_at_most
         if not limit or self.seconds <= limit:
             return ""
-        return f"has not returned for {limit:g} s, the limit that call_timeout sets"
+        return f"has not returned for {limit:g} s, the limit of a call, which call_timeout sets"

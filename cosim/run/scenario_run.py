@@ -6,13 +6,14 @@ Each step takes values and returns one: `cosim.run.checked`, `cosim.run.ready`, 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from time import perf_counter
 
+from cosim.components.component import Component
 from cosim.diagnostics.call_log import CallLog
-from cosim.process.exit_guard import limited_calls
+from cosim.process.exit_guard import limited_calls, limited_ends
 from cosim.process.interruption import Interruption
 from cosim.run.checked import check_task
 from cosim.run.executed import execute
@@ -56,7 +57,7 @@ def run_scenario(
     """
     master = task.table.master
     remarks = Remarks(warn or LOG.warning, list(warnings))
-    with ExitStack() as resources:
+    with limited_ends(master.call_timeout), ExitStack() as resources:
         log = _open_log(call_log or CALL_LOG, resources) if master.log_calls else None
         with limited_calls(master.call_timeout):
             begin = perf_counter()
@@ -68,7 +69,16 @@ def run_scenario(
                 outcome = finish(execute(ready, seconds, log, interruption, remarks))
         if outcome.failure is None:
             interruption.check()  # it came while the results were put away
-        return outcome
+    if outcome.failure is None:
+        remarks.warn(*_failed_ends(ready.coupled.components))
+    return outcome
+
+
+def _failed_ends(components: Mapping[str, Component]) -> Iterator[str]:
+    """A warning for each component that could not be put away; the outcome is written by then."""
+    for name, component in components.items():
+        if component.failed_ends:
+            yield f"{name}: after the run, which is complete, {'; '.join(component.failed_ends)}."
 
 
 def _open_log(path: Path, resources: ExitStack) -> CallLog:

@@ -141,6 +141,36 @@ def test_a_call_past_its_limit_ends_the_run_in_words(fmu: Path, tmp_path: Path) 
     assert len(load_result(tmp_path / "out").table) == 25
 
 
+@pytest.mark.parametrize(("deed", "where"), [("terminated", "terminate"), ("freed", "freeInstance")])
+def test_an_end_that_never_comes_is_limited_and_loses_nothing(fmu: Path, tmp_path: Path, deed: str, where: str) -> None:
+    error = reported(start(fmu, tmp_path, f"hangs-when-{deed}", call_timeout=0.5))
+    assert f"component 'bad' in {where} at t = 0.5 s has not returned for 0.5 s" in error
+    assert f"The results were written before: {tmp_path / 'out'}" in error
+    assert len(load_result(tmp_path / "out").table) == 51
+
+
+def test_without_a_limit_of_calls_only_ends_have_one_where_somebody_keeps_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    page = LastCall(mmap.mmap(-1, PAGE))
+    monkeypatch.setattr(exit_guard, "LAST_CALL", page)
+    seen: list[float] = []
+    for page.timed in (True, False):
+        with exit_guard.limited_ends(None):
+            with exit_guard.limited_calls(None):
+                seen.append(page.seconds_at_most)
+            seen.append(page.seconds_at_most)
+    assert seen == [0.0, 30.0, 0.0, 0.0]
+    assert page.seconds_at_most == 0.0
+
+
+def test_an_error_of_terminate_is_a_warning_of_the_run(fmu: Path) -> None:
+    warnings: list[str] = []
+    outcome = hostile(fmu, "fails-when-terminated").run(warn=warnings.append)
+    expected = "bad: after the run, which is complete, fmi2Terminate failed with status 3 (error)."
+    assert warnings[-1] == outcome.warnings[-1] == expected
+
+
 def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatch) -> None:
     """As the watch looks: the same call three times 0.2 s, then others, then one that stays."""
     page = LastCall(mmap.mmap(-1, PAGE))
@@ -156,7 +186,7 @@ def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatc
     page.call[0] = 1
     for _ in range(4):
         looking._check_duration(0.2)
-    assert ended == ["has not returned for 0.5 s, the limit that call_timeout sets"]
+    assert ended == ["has not returned for 0.5 s, the limit of a call, which call_timeout sets"]
 
 
 def test_a_limit_holds_in_a_script_that_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,7 +199,7 @@ def test_a_limit_holds_in_a_script_that_nobody_watches(monkeypatch: pytest.Monke
         assert ended == []
         time.sleep(0.3)
     LAST_CALL.call[0] = 0
-    assert ended[0] == "has not returned for 0.1 s, the limit that call_timeout sets"
+    assert ended[0] == "has not returned for 0.1 s, the limit of a call, which call_timeout sets"
 
 
 @pytest.mark.parametrize("number", STOPPING[1:], ids=lambda n: n.name)

@@ -128,7 +128,7 @@ def test_a_run_that_ends_its_process_or_hangs_fails_alone(fmu: Path, tmp_path: P
         where = "component 'hostile' in doStep at t = 0.2 s"
         assert runs.failures == [
             f"deed = 3: {where}: its process was ended by the signal SIGSEGV",
-            f"deed = 4: {where} has not returned for 0.3 s, the limit that call_timeout sets",
+            f"deed = 4: {where} has not returned for 0.3 s, the limit of a call, which call_timeout sets",
             f"deed = 2: {where}: its process ended with exit code 0",
         ]
         assert len(read_lines(journal.path)) == 5  # a resumed one runs nothing again

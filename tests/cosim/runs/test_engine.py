@@ -145,7 +145,7 @@ def test_a_python_model_that_ends_its_process_or_hangs_is_a_row_where_calls_are_
         None,
         f"{where}: its process ended with exit code 0",
         f"{where}: its process was ended by the signal SIGSEGV",
-        f"{where} has not returned for 1 s, the limit that call_timeout sets",
+        f"{where} has not returned for 1 s, the limit of a call, which call_timeout sets",
         None,
     ]
 

@@ -75,7 +75,8 @@ def test_a_call_that_lets_no_thread_run_is_ended_too() -> None:
     with Team(1) as team:
         ends = list(team.each([Task(look_for_ever, 0.3), Task(square, 2)]))
     assert [ended.row for _, ended in ends] == [None, 4]
-    words = "component 'own' in doStep at t = 0.2 s has not returned for 0.3 s, the limit that call_timeout sets"
+    limit = "the limit of a call, which call_timeout sets"
+    words = f"component 'own' in doStep at t = 0.2 s has not returned for 0.3 s, {limit}"
     assert ends[0][1].failure == Failure(words)
 
 
