@@ -16,6 +16,9 @@ from cosim.comparison.verdict import ComparisonFinding, Curves, Kind, SignalComp
 
 _FEW_ROWS = 0.01
 """Share of the rows, on either hand, that are few."""
+_SMALL, _ROUNDED = 0.01, 1e-3
+"""Differences that are not worth a remark: a share of the standard deviation, and of the tolerance, which a baseline
+rounds to half of that."""
 _LEAST_SPREAD = 1e-9
 """Of the range: a standard deviation that is more than rounding."""
 WORST = 5  # points that are kept
@@ -193,7 +196,7 @@ def compare_signal(task: Task) -> SignalComparison:
 
 
 def _remark(task: Task, points: Points, allowed: Allowed) -> str:
-    """That the range is that of a few rows, and that by the range of the others the signal would not have passed."""
+    """That the range is that of a few rows, and that the others differ by what counts for them."""
     values = task.reference.values[task.reference.finite]
     if not len(values):
         return ""
@@ -204,7 +207,7 @@ def _remark(task: Task, points: Points, allowed: Allowed) -> str:
         return ""
     inside = points.evaluated & (points.reference >= low) & (points.reference <= high)
     error = float(np.max(np.abs(points.error[inside]), initial=0.0))
-    if error <= task.tolerance.value_for(share):
+    if error <= max(_SMALL * spread, min(_ROUNDED * allowed.value, 0.5 * spread)):
         return ""
     rows = len(values) - len(usual)
     scale, rest, size, limit = (with_unit(v, task.unit) for v in (allowed.scale, share, error, allowed.value))
