@@ -165,7 +165,7 @@ def test_the_noise_of_a_solver_on_a_large_held_value_is_no_difference(wobble: fl
     assert signal(time, reference, result, Tolerance()).passed == passes
 
 
-@given(st.sampled_from([500.0, 1e3, 3e4, 7e5]), st.integers(0, 1), st.sampled_from([0.001, 0.005, 0.02, 0.1, 0.5, 1.0]))
+@given(st.sampled_from([1e3, 3e4, 7e5]), st.integers(0, 1), st.sampled_from([0.001, 0.005, 0.02, 0.1, 0.5, 1.0]))
 def test_a_range_that_a_few_rows_set_is_said(spike: float, sign: int, share: float) -> None:
     time = np.arange(1001) * 0.1
     small = np.sin(time)
