@@ -31,6 +31,7 @@ from cosim.run.expected_gaps import ExpectedGap, expected_gap
 from cosim.run.layouts import make_layout
 from cosim.run.observer_findings import evaluated
 from cosim.run.outcome import INTERRUPTED, Outcome
+from cosim.run.recorded_plant import other_plant
 from cosim.run.run_seeds import with_seeds
 from cosim.scenario.schema import step_count
 from cosim.simulation.scenario import Scenario
@@ -113,6 +114,8 @@ def benchmark_observers(
         if recorded is None:
             _record(recording_scenario(scenario, parts), folder, warn, building, keep=record is not None)
         result = load_result(folder)
+        if warn and recorded and (other := other_plant(result, parts.table, parts.folder, parts.plant)):
+            warn(other)
         known = derived_parameters(stated, parts, result)
         candidates, notes = find_candidates(scenario, parts, observers, known)
         wrong = Disturbance() if disturb is None else disturb(_journey(scenario, parts, result))

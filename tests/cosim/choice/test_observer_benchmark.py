@@ -126,11 +126,14 @@ def test_an_observer_in_the_loop_is_recorded_in_it_and_said_to_be() -> None:
 def test_a_recording_is_kept_and_can_be_played_back_later(tmp_path: Path, benchmark: ObserverBenchmark) -> None:
     first = benchmark_observers(two(), ["uio"], record=tmp_path / "run")
     assert "locomotive.speed" in (load_result(tmp_path / "run").table.dtype.names or ())
-    again = benchmark_observers(two(), ["uio"], recorded=tmp_path / "run")
+    warned: list[str] = []
+    again = benchmark_observers(two(), ["uio"], recorded=tmp_path / "run", warn=warned.append)
+    assert not warned
     sizes = [b.scores[-1].whole for b in (first, again, benchmark)]
     assert sizes[0] == sizes[1] == sizes[2]
     quietly(two().set("locomotive.train_speed", 9.0)).write(tmp_path / "other", report=False)
-    other = benchmark_observers(two(), ["uio"], recorded=tmp_path / "other")
+    other = benchmark_observers(two(), ["uio"], recorded=tmp_path / "other", warn=warned.append)
+    assert ["locomotive.train_speed was 9.0 and is" in text for text in warned] == [True]
     assert other.outcomes["uio"]["locomotive.speed"][0] == 9.0
     assert other.scores[0].whole != sizes[0]
 
