@@ -66,7 +66,7 @@ def test_an_fmu_that_refuses_the_tolerance_says_so_with_a_hint(tmp_path: Path, v
 
 @pytest.mark.parametrize("value", [0.0, -1e-6, float("nan"), float("inf"), "fine", True, [1e-6]])
 def test_what_is_no_tolerance_is_refused(value: Any) -> None:
-    refused = pytest.raises(ScenarioError, match=r"tolerance: expected a relative tolerance above 0, or 'none'")
+    refused = pytest.raises(ScenarioError, match="expected a relative tolerance, a number above 0, or 'none'")
     with refused:
         scenario(Path("any.fmu"), tolerance=value)
     with refused:
