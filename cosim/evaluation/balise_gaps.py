@@ -155,11 +155,11 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
         spec: roles of the signals, labels, start of the evaluation.
 
     Returns:
-        The errors; without gaps where there is no true position, or fewer than two balises were read.
+        The errors; without gaps where there is no true position in any row, or fewer than two balises were read.
     """
     place = recorded(result, spec.true_position)
     telegrams = telegrams_read(result.events)
-    if place is None or len(telegrams) < 2:
+    if place is None or not len(place) or len(telegrams) < 2:
         return GapErrors((), {}, {})
     times = np.array([event.delivered_at for event in telegrams])
     rows = rows_before(result.time, times)

@@ -145,7 +145,7 @@ def write_groups(result: SweepRuns, by: str, directory: Path) -> Path:
     """
     path = directory / GROUPS
     try:
-        with path.open("w", newline="", encoding="utf-8") as file:
+        with path.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow([by, "measure", "unit", "mean", "low", "high", "count"])
             for key, measures in grouped(result, by).items():

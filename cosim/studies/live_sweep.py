@@ -103,6 +103,8 @@ def _measure(result: SweepRuns) -> Column | None:
 
 def _verdict(result: SweepRuns) -> PageVerdict:
     count, failed = len(result), len(result.failed)
+    if not count:
+        return PageVerdict("No run was made.", "bad")
     text = f"{count - failed} of {count} runs came to their end"
     text += f", {result.unmet}." if result.unmet else " and met all expectations." if _is_met(result) else "."
     column = _measure(result)

@@ -49,10 +49,7 @@ def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax
         lone = (others and len(groups) == 1) or against.rpartition(".")[2] == "seed"
         style = style | {"linestyle": ""} if lone else style
         ax.plot(x, y, marker="o", markersize=4, label=label or None, **style)
-    if ticks is not None:
-        ax.set_xticks(range(len(ticks)), ticks)
-    elif all(isinstance(run.settings.get(against), int) for run in result.runs):
-        ax.xaxis.set_major_locator(MaxNLocator(integer=True))  # there is no seed 0.25
+    _set_ticks(ax, ticks, [run.settings.get(against) for run in result.runs])
     ax.set_xlabel(with_unit(against, setting_unit(result, against)))
     ax.set_ylabel(with_unit(measure, result.unit(measure)))
     if result.failed:
@@ -60,6 +57,13 @@ def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax
     if 1 < len(groups) <= _LINES_NAMED:
         ax.legend()
     return ax
+
+
+def _set_ticks(ax: Axes, texts: Sequence[str] | None, values: Sequence[Any]) -> None:
+    if texts is not None:
+        ax.set_xticks(range(len(texts)), texts)
+    elif all(isinstance(value, int) for value in values):
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))  # there is no seed 0.25
 
 
 def draw_measures(result: SweepRuns, kind: str) -> dict[str, bytes]:

@@ -154,7 +154,11 @@ def _verdict_text(comparison: Comparison) -> str:
     compared = [s for s in comparison.signals if s.status in ("equal", "within", "differs")]
     failed, telegrams, packets = comparison.failed, comparison.events, comparison.packets
     text = f"{len(compared)} signals were compared; "
-    text += "all are within tolerance." if not failed else f"{len(failed)} are not as in the reference."
+    text += (
+        "all are within tolerance."
+        if not failed
+        else f"{len(failed)} {'is' if len(failed) == 1 else 'are'} not as in the reference."
+    )
     if packets.differences:
         text += f" Of the packets {packets.matched} match, and {len(packets.differences)} differences were found."
     if not telegrams.compared:

@@ -249,8 +249,25 @@ def _verdict(runs: Sequence[OverlayRun], different: int, changes: Sequence[Card]
     settings = "no setting that is known differs" if not different else f"{different} settings differ"
     text = f"{len(runs)} complete runs; {'one setting differs' if different == 1 else settings}."
     text = text if len(runs) > 1 else "One complete run."
-    found = " ".join(f"{name}: {size} {where}." for name, size, where, _ in changes)
-    return PageVerdict(f"{text} {found}".rstrip(), "doubt" if any(card[3] == "doubt" for card in changes) else "")
+    odd = _two_units(runs)
+    found = " ".join([*(f"{name}: {size} {where}." for name, size, where, _ in changes), *odd[:1]])
+    if len(odd) > 1:
+        found += f" So have {len(odd) - 1} more signals."
+    return PageVerdict(f"{text} {found}".rstrip(), "doubt" if odd or any(c[3] == "doubt" for c in changes) else "")
+
+
+def _two_units(runs: Sequence[OverlayRun]) -> list[str]:
+    """What is recorded in another unit in another run, of which no difference is made."""
+    units: dict[str, dict[str, str]] = {}
+    for run in runs:
+        for signal in run.result.signals:
+            units.setdefault(signal.name, {}).setdefault(signal.unit, run.label)
+    return [
+        f"{name} has several units, {', '.join(f'{unit} in {label}' for unit, label in found.items())}: "
+        "no difference of it is made."
+        for name, found in units.items()
+        if len(found) > 1
+    ]
 
 
 def _most_changed(runs: Sequence[OverlayRun]) -> str:

@@ -99,6 +99,8 @@ def run_verdict(
         stop = number_entry(result.summary, "stop")
         end = f"at {reached} s" + (f" of {instant(stop)} s" if stop is not None else "")
         return PageVerdict(f"The run ended early, {end}: {first_sentence(result.failure)[0]}", "bad")
+    if not len(result.time):
+        return PageVerdict("The run has no rows: nothing was recorded, and nothing can be said of it.", "bad")
     unmet = [one for one in evaluated if not one.passed]
     speed = recorded(result, spec.true_speed)
     moves = speed is None or not len(speed) or bool(np.any(~(np.abs(speed) <= 0.01)))
@@ -121,13 +123,16 @@ def _with_unmet(unmet: Sequence[Evaluated], evaluated: Sequence[Evaluated], text
     )
 
 
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
 def _without_observers(result: Result, reached: str) -> str:
-    signals = len(result.table.dtype.names or ()) - 1
-    components = len({name.partition(".")[0] for name in (result.table.dtype.names or ())[1:]})
-    text = (
-        f"The run is complete to {reached} s: {signals} signals of {components} components; nothing is estimated in it."
-    )
-    missing = [name for name in (result.table.dtype.names or ())[1:] if not np.isfinite(result[name]).all()]
+    names = (result.table.dtype.names or ())[1:]
+    signals = _counted(len(names), "signal")
+    components = _counted(len({name.partition(".")[0] for name in names}), "component")
+    text = f"The run is complete to {reached} s: {signals} of {components}; nothing is estimated in it."
+    missing = [name for name in names if not np.isfinite(result[name]).all()]
     return f"{text} Not finite somewhere: {', '.join(missing[:3])}." if missing else text
 
 

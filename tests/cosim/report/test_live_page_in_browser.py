@@ -155,7 +155,7 @@ def test_a_mark_is_jumped_to_with_the_panel_that_it_is_about(tmp_path: Path) -> 
 def test_axes_are_chosen(tmp_path: Path) -> None:
     with opened(explored_page(), tmp_path) as page:
         page.get_by_role("combobox", name="Over").select_option(label="train.position")
-        page.wait_for_function(f"{EXPLORER}.axisName() === 'Train.position [m]'")
+        page.wait_for_function(f"{EXPLORER}.axisName() === 'train.position [m]'")
         page.get_by_role("button", name="Logarithmic axis, of absolute values: Speed").click()
         page.wait_for_function(f"{EXPLORER}.charts[0].plot.scales['y m/s'].distr === 3")
         assert page.evaluate(f"Math.min(...{EXPLORER}.charts[0].plot.data[1].filter(Number.isFinite))") > 0.0
@@ -276,6 +276,29 @@ def test_long_runs_open_with_their_extremes_and_are_whole_soon(tmp_path: Path) -
         found = [v for v in page.evaluate(f"{EXPLORER}.charts[0].plot.data[1]") if v is not None]
         assert max(found) == pytest.approx(9.0, abs=1e-3)
         assert len(found) in (11, 12, 13)
+
+
+def test_a_panel_without_a_number_and_names_without_a_blank_fit_everywhere(tmp_path: Path) -> None:
+    """On a logarithmic axis, too; a name is never cut, and a large number on an axis is short."""
+    long, nothing = f"component.{'signal_with_a_long_name_' * 4}", np.full(3, np.nan)
+    curves = [PageCurve(long, nothing, "m"), PageCurve("a.b", np.array([1.0, 2.0, 3.0]), "m")]
+    made = LivePage(
+        "t",
+        PageVerdict("v"),
+        recordings=[PageRecording("r", np.array([1.0e6, 1.1e6, 1.2e6]), curves, "train.mass", "kg")],
+        panels=[PagePanel(long, [long], log=True), PagePanel("b", ["a.b", long])],
+    )
+    check_page(written(made, tmp_path / "page.html"))
+    with opened(made, tmp_path, PHONE) as page:
+        cut = "[...document.querySelectorAll('.entry .name')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
+        assert page.evaluate(cut) == 0
+        assert page.evaluate(f"{EXPLORER}.axisName()") == "train.mass [kg]"
+        assert page.evaluate("[1e6, 1.25e6, 1.23456789e-7, 12].map((v) => shown(v, 7))") == [
+            "1e6",
+            "1.25e6",
+            "1.23457e−7",
+            "12",
+        ]
 
 
 def test_dark_and_light_are_drawn(tmp_path: Path) -> None:

@@ -81,6 +81,16 @@ def test_an_empty_run_is_named() -> None:
         make_runs([scaled(1.0), empty], [SPEC, SPEC], ["a", "b"])
 
 
+def test_a_signal_with_two_units_is_named_and_no_difference_of_it_is_made() -> None:
+    first = scaled(1.0)
+    name = first.signals[0].name
+    second = replace(first, signals=[replace(first.signals[0], unit="km"), *first.signals[1:]])
+    verdict = overlay_page(make_runs([first, second], [SPEC, SPEC], ["a", "b"])).verdict
+    assert f"{name} has several units, {first.signals[0].unit} in a, km in b: no difference" in verdict.text
+    assert verdict.mood == "doubt"
+    assert "several units" not in overlay_page(make_runs([first, first], [SPEC, SPEC], ["a", "b"])).verdict.text
+
+
 # --- figures ----------------------------------------------------------------------------------------------------------
 
 

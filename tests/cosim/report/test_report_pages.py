@@ -428,3 +428,9 @@ def test_a_figure_that_fails_is_left_out(monkeypatch: pytest.MonkeyPatch, caplog
 def test_a_figure_says_what_it_is() -> None:
     with pytest.raises(TypeError, match="the figure Untitled has no title and no caption"):
         type("Untitled", (Panel,), {"name": "untitled"})
+
+
+def test_a_run_without_rows_is_not_called_complete() -> None:
+    result = synthetic_result()
+    verdict = run_page(replace(result, table=result.table[:0]), synthetic_spec()).verdict
+    assert (verdict.mood, verdict.text.partition(":")[0]) == ("bad", "The run has no rows")

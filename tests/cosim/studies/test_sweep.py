@@ -24,6 +24,7 @@ from cosim.studies.live_sweep import sweep_page
 from cosim.studies.measures import UNMET
 from cosim.studies.sampling_plans import uniform
 from cosim.studies.seed_runs import seed_study
+from cosim.studies.sweep_files import write_index
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
@@ -289,6 +290,19 @@ def test_the_verdict_names_every_component_that_has_the_measure_the_best_first(t
     met = [replace(run, measures={**run.measures, UNMET: 0.0}) for run in runs]
     page = sweep_page(SweepRuns(plant(), ["seed"], met, units), tmp_path)
     assert (page.verdict.mood, page.verdict.text.partition(". ")[0]) == ("good", f"{ending} and met all expectations")
+
+
+def test_of_no_run_nothing_good_is_said(tmp_path: Path) -> None:
+    assert sweep_page(SweepRuns(plant(), ["train.mass"], []), tmp_path).verdict == PageVerdict(
+        "No run was made.", "bad"
+    )
+
+
+def test_names_that_are_no_unicode_are_written(tmp_path: Path) -> None:
+    """As those of files may be."""
+    runs = [SweepRun(0, {"train.file": "a\ud800"}, measures={"b\ud800": 1.0})]
+    paths = write_index(SweepRuns(plant(), ["train.file"], runs), tmp_path)
+    assert "a\\ud800" in paths["csv"].read_text(encoding="utf-8")
 
 
 def test_the_page_names_what_failed_the_worst_run_and_what_it_goes_with(tmp_path: Path) -> None:

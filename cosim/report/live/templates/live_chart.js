@@ -19,7 +19,7 @@ function shown(value, digits = 5) {
   if (Number.isNaN(value) || value == null) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
   const size = Math.abs(value);
-  const text = size && (size < 1e-4 || size >= 1e6) ? value.toExponential(digits - 2) : String(Number(value.toPrecision(digits)));
+  const text = size && (size < 1e-4 || size >= 1e6) ? Number(value.toExponential(digits - 2)).toExponential().replace("+", "") : String(Number(value.toPrecision(digits)));
   return text.replace("-", "−");
 }
 
@@ -155,7 +155,7 @@ class Chart {
       return low <= high ? [{part, low, high}] : [];
     });
     for (const {part} of sizes) part.off = false;
-    if (!sizes.length) return [0, 1];
+    if (!sizes.length) return this.log ? [0.1, 1] : [0, 1];
     let kept = sizes;
     if (!this.wide && !this.log && sizes.length > 1) {
       const middles = sizes.map((s) => 0.5 * (s.low + s.high)).sort((a, b) => a - b), middle = middles[middles.length >> 1];
@@ -185,7 +185,7 @@ class Chart {
     }));
     return {
       width, height: explorer.height(), legend: {show: false}, scales, bands, padding: [8, 30, 0, 0],
-      axes: [{...axis, label: explorer.axisName(), labelFont: font, labelSize: 18, size: 34, values: (_, splits) => splits.map((v) => shown(v, 7))}, ...sides],
+      axes: [{...axis, label: explorer.axisName(), labelFont: font, labelSize: 18, size: 34, space: 76, values: (_, splits) => splits.map((v) => shown(v, 7))}, ...sides],
       cursor: {y: false, points: {show: false}, drag: {x: true, y: false, setScale: false}, bind: {dblclick: () => () => explorer.zoom(...explorer.whole())}},
       series: [{}, ...this.visible.map((part) => ({
         ...part.style, scale: `y ${part.unit}`, points: {show: (u) => u.data[0].length <= 2 * LINES, size: 5},

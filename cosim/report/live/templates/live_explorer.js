@@ -67,7 +67,8 @@ class Explorer {
   axisName() {
     const curve = this.curves.find((c) => c.name === this.axis), x = curve ?? this.data.recordings[0]?.x ?? {name: "time", unit: "s"};
     const name = curve ? curve.text : x.name;
-    return `${name.charAt(0).toUpperCase()}${name.slice(1)}${x.unit && x.unit !== "1" ? ` [${x.unit}]` : ""}`;
+    const begun = /^[a-z ]+$/.test(name) ? `${name.charAt(0).toUpperCase()}${name.slice(1)}` : name;  // a word, not a signal
+    return `${begun}${x.unit && x.unit !== "1" ? ` [${x.unit}]` : ""}`;
   }
 
   height() { return this.charts.length > 1 ? 180 : 260; }
