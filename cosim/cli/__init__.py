@@ -12,7 +12,10 @@ from collections.abc import Sequence
 from cosim.errors import CosimError
 from cosim.process.interruption import ends_like_ctrl_c
 from cosim.process.watch import can_watch, watched
+from cosim.scenario.shipped import shipped_scenarios
+from fmu_observer import OBSERVERS
 from fmus.cli.commands import CommandProgram
+from plant_models import PLANTS
 
 __all__ = ["main"]
 
@@ -32,6 +35,14 @@ PROGRAM = CommandProgram(
         ("Take an observer away as an FMU", "fmus build quasi_lpv_uio"),
     ),
     {".toml": "run", ".ssp": "run", ".fmu": "new"},
+    {
+        "scenario": shipped_scenarios,
+        "subject": shipped_scenarios,
+        "what": lambda: [*shipped_scenarios(), *OBSERVERS, *PLANTS],
+        "model": lambda: [*PLANTS, *OBSERVERS],
+        "observer": lambda: [*OBSERVERS],
+        "observers": lambda: [*OBSERVERS],
+    },
     (CosimError,),
     ends_like_ctrl_c,
     lambda error, _: str(error),

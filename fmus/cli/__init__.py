@@ -9,9 +9,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from fmu_observer import OBSERVERS
 from fmus.cli.commands import CommandProgram
 from fmus.cli.failures import EXPECTED, in_words
 from fmus.cli.signals import interruptible
+from plant_models import PLANTS
 
 PROGRAM = CommandProgram(
     "fmus",
@@ -25,6 +27,7 @@ PROGRAM = CommandProgram(
         ("See how far it can be trusted", "fmus check vendor.fmu"),
     ),
     {".fmu": "check"},
+    {"names": lambda: [*PLANTS, *OBSERVERS]},
     EXPECTED,
     interruptible,
     in_words,

@@ -22,7 +22,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from fmus.cli.completion import completion_script
+from fmus.cli.completion import SHELLS, Names, completion_script
 from fmus.cli.output import Output, UnwritableError
 from fmus.cli.parsers import MISTAKE, Parser, print_error
 from fmus.cli.signals import BROKEN_PIPE, forget_output
@@ -183,7 +183,8 @@ class CommandProgram:
         name: of the program. description: one line. package: the room of the commands' files.
         groups: of commands, in the order of the help. tasks: what users come for, each with what they type: shown
             where nothing was typed. files: what is done with a file, by its ending, where no command was typed.
-        expected: errors that are for the user.
+        names: what completion offers besides files, by the ``dest`` of an argument. expected: errors that are for the
+            user.
         within: in what a command runs. in_words: what the user reads of an error and the options.
     """
 
@@ -193,6 +194,7 @@ class CommandProgram:
     groups: Sequence[str]
     tasks: Sequence[tuple[str, str]]
     files: Mapping[str, str]
+    names: Names
     expected: tuple[type[BaseException], ...]
     within: Callable[[], AbstractContextManager[None]]
     in_words: Callable[[BaseException, argparse.Namespace], str]
@@ -209,8 +211,8 @@ class CommandProgram:
         if not words:
             print(self.first_screen())
             return _DONE
-        if list(words) == [_COMPLETION]:
-            print(self.completion(), end="")
+        if words[0] == _COMPLETION:
+            print(self.completion(" ".join(words[1:]) or "bash"), end="")
             return _DONE
         options = argparse.Namespace(command_line=shlex.join([self.name, *words]))
         try:  # reading the words loads the command, which may be interrupted too
@@ -241,11 +243,17 @@ class CommandProgram:
         more = f"All commands: {self.name} --help. Of one of them: {self.name} COMMAND --help."
         return joined([self.description, tasks, more], terminal_width())
 
-    def completion(self) -> str:
-        """The script that completes its commands in a shell; all of them are loaded for it."""
+    def completion(self, shell: str) -> str:
+        """The script that completes its commands in a shell; all of them are loaded for it.
+
+        Args:
+            shell: a name of `SHELLS`; another one ends the program.
+        """
+        if shell not in SHELLS:
+            Parser(prog=self.name).error(f"no completion for {shell!r}; there is one for {', '.join(SHELLS)}")
         names = [command.name for command in find_commands(self.package)]
         found = {name: _subparsers(self.parser([name])).choices[name] for name in names}
-        return completion_script(self.name, found)
+        return completion_script(shell, self.name, found, self.names)
 
     def parser(self, words: Sequence[str]) -> argparse.ArgumentParser:
         """The parser of the program; of the commands, only the one that is used is loaded.
@@ -256,8 +264,8 @@ class CommandProgram:
         parser = Parser(prog=self.name, description=self.description, formatter_class=argparse.RawTextHelpFormatter)
         versions = "versions of the package and of what it runs on"
         parser.add_argument("--version", action=_Version, nargs=0, help=versions)
-        shell = f'completion for bash and zsh: eval "$({self.name} {_COMPLETION})"'
-        parser.add_argument(_COMPLETION, action="store_true", help=shell)
+        shell = f'completion: eval "$({self.name} {_COMPLETION} bash)" or zsh; {self.name} {_COMPLETION} fish | source'
+        parser.add_argument(_COMPLETION, choices=tuple(SHELLS), help=shell)
         how = f"one of those below; '{self.name} COMMAND --help' says what it takes"
         subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND", help=how)
         used = next((word for word in words if not word.startswith("-")), None)

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
-import shutil
-import subprocess
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -108,30 +105,3 @@ def test_colour_is_for_terminals_that_want_it(
     text = "program: wrong (see 'program --help')\n"
     assert wrong(True) == f"\x1b[1;31mprogram:\x1b[0m{text.removeprefix('program:')}"
     assert wrong(True, NO_COLOR="1") == wrong(True, TERM="dumb") == wrong(False) == text
-
-
-def completed(script: str, *words: str, folder: Path) -> list[str]:
-    """What bash offers for the last of the words."""
-    typed = f"COMP_WORDS=({shlex.join(words)}); COMP_CWORD={len(words) - 1}"
-    line = f"{typed}; _{words[0]}; printf '%s\\n' \"${{COMPREPLY[@]}}\""
-    done = subprocess.run(
-        ["bash", "--norc", "-c", f"{script}\n{line}"], cwd=folder, capture_output=True, text=True, check=True
-    )
-    assert done.stderr == ""
-    return done.stdout.split()
-
-
-@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
-def test_bash_completes_commands_actions_options_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "vendor.toml").touch()
-    assert COSIM.run(["--completion"]) == 0
-    script = capsys.readouterr().out
-    assert completed(script, "cosim", "sw", folder=tmp_path) == ["sweep"]
-    assert set(completed(script, "cosim", "", folder=tmp_path)) == {c.name for c in find_commands("cosim.cli")}
-    assert completed(script, "cosim", "run", "ven", folder=tmp_path) == ["vendor.toml"]
-    assert completed(script, "cosim", "run", "vendor.toml", "--no-r", folder=tmp_path) == ["--no-report"]
-    assert completed(script, "cosim", "baseline", "upd", folder=tmp_path) == ["update"]
-    assert completed(script, "cosim", "baseline", "check", "--agai", folder=tmp_path) == ["--against"]
-    assert completed(script, "cosim", "run", "--aga", folder=tmp_path) == []
-    assert FMUS.run(["--completion"]) == 0
-    assert completed(capsys.readouterr().out, "fmus", "build", "--plat", folder=tmp_path) == ["--platform"]
