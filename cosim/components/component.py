@@ -148,8 +148,7 @@ class Component(_DifferentiableComponent):
     `calls` of it, `call_statistics` of everything else. `messages` are what the slave logged. `time` is where it
     stands [s].
     `terminated` says that the slave asked for the end of the run. `trespasses` are what it changed for everybody in the
-    process before its first step, each with the call that did; it was put back. `failed_ends` are calls that failed
-    when it was put away. Whatever a call of the slave throws
+    process before its first step, each with the call that did; it was put back. Whatever a call of the slave throws
     comes out as a `RunError` with component, time and the names of the variables concerned.
 
     Args:
@@ -187,7 +186,6 @@ class Component(_DifferentiableComponent):
         self.log: _LogSwitch | None = None
         self.call_statistics = {kind: CallStatistics() for kind in _KINDS}
         self.trespasses: dict[str, str] = {}
-        self.failed_ends: list[str] = []
         self._numbers, self._call_numbers = LAST_CALL.numbers(name), dict[str, int]()
         self._call_note, self._step_number = LAST_CALL, self._numbers + STEP
         self._readers: dict[str, Callable[[], Mapping[str, int] | None]] = {}
@@ -354,14 +352,6 @@ class Component(_DifferentiableComponent):
         """The number of a call among all; what stands behind ``=``, a value, is no part of it."""
         number = self._call_numbers[what] = LAST_CALL.number(self.name, what.partition(" = ")[0])
         return number
-
-    def _quietly(self, what: str, call: Callable[[], Any]) -> None:
-        """A component that fails while it is put away changes nothing any more; it is kept what failed."""
-        try:
-            with LAST_CALL.making(self.name, what, self.time):
-                call()
-        except Exception as error:
-            self.failed_ends.append(str(error).rstrip(".") or f"{what} failed: {type(error).__name__}")
 
     def explained(self, what: str, error: Exception, t: float | None = None) -> Exception:  # noqa: D102 - see Instance
         return error if isinstance(error, RunError) else super().explained(what, error, t)

@@ -78,7 +78,7 @@ def _failed_ends(components: Mapping[str, Component]) -> Iterator[str]:
     """A warning for each component that could not be put away; the outcome is written by then."""
     for name, component in components.items():
         if component.failed_ends:
-            yield f"{name}: after the run, which is complete, {'; '.join(component.failed_ends)}."
+            yield f"{name} could not be put away after the run, which is complete: {'; '.join(component.failed_ends)}"
 
 
 def _open_log(path: Path, resources: ExitStack) -> CallLog:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -52,11 +51,10 @@ class Instance(Described):
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
         super().__init__(name, slave, description)
+        self.failed_ends: list[str] = []
         self.terminated = self._alive = self._running = False
         self._loaded = is_native(slave)
         self.call_warnings = CallWarnings(self)
-
-    # -- how it stands ----------------------------------------------------------------------------------------------
 
     @property
     def running(self) -> bool:
@@ -82,7 +80,7 @@ class Instance(Described):
         self.terminated = self._running = False
 
     def terminate(self) -> None:
-        """End the run; errors of a dying instance are of no interest."""
+        """End the run; an error of a dying instance is kept in `failed_ends`."""
         if self._alive and self._running:
             self._running = False
             self._quietly("terminate", self.slave.terminate)
@@ -384,9 +382,11 @@ class Instance(Described):
         return element_writer(self, names, values)
 
     def _quietly(self, what: str, call: Callable[[], Any]) -> None:
-        """Run a call that changes nothing any more where it fails."""
-        with suppress(Exception):
+        """Run a call that changes nothing any more where it fails; it is kept what failed."""
+        try:
             self.guard(what, call)
+        except Exception as error:
+            self.failed_ends.append(str(error))
 
 
 def shown(names: Sequence[str]) -> str:
