@@ -16,7 +16,7 @@ from fmus.fmi.standard import CO_SIMULATION
 
 NOTE, LIMIT, DISTRUST = Verdict.NOTE, Verdict.LIMIT, Verdict.DISTRUST
 
-REPEATED = "repeated run"
+REPEATED, END = "repeated run", "terminate and free"
 ONE_INSTANCE = "have one instance of it in a process, a fresh process for each run"
 _NO_PROBE = (
     "with balises on it, choose the method early-return or interpolate: the probe for the others would crash too"

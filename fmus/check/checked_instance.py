@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from fmpy.model_description import ModelDescription
 
@@ -58,6 +60,8 @@ class FmuInstance(Instance):
         self, folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False
     ) -> None:
         self.messages: deque[str] = deque(maxlen=_MESSAGES_KEPT)
+        self.ends = True  # whether it is terminated and freed; an FMU that dies there is left as it is
+        self.announce: Callable[[str], None] = lambda _what: None  # the call that ends it, and nothing after it
         slave = self.guard(LOADING, lambda: load(folder, description, self.interface, name))
         super().__init__(name, slave, description)
         self.logging = logging
@@ -81,8 +85,14 @@ class FmuInstance(Instance):
         """Free the instance; the library stays loaded."""
         self._alive = self._running = False
         call = getattr(self.slave, f"fmi{self.fmi_version}FreeInstance")
-        self.guard("freeInstance", lambda: call(self.slave.component))
+        self._quietly("freeInstance", lambda: call(self.slave.component))
         self.slave.component = None
+
+    def _quietly(self, what: str, call: Callable[[], Any]) -> None:
+        if self.ends:
+            self.announce(what)
+            super()._quietly(what, call)
+            self.announce("")
 
     def failure(self, reason: str, t: float | None = None) -> SlaveError:
         place = "" if t is None else f" at t = {t:g} s"

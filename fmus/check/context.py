@@ -4,11 +4,12 @@ process share.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TypeVar
 
 from fmpy.model_description import ModelDescription
 
@@ -21,6 +22,7 @@ SHARE_OF_BUDGET = 0.3
 """Of the time of a check, for finding inputs that move something."""
 
 
+Made = TypeVar("Made", bound=FmuInstance)
 INSTANCE = "checked"
 """Name of all instances, one after the other and beside each other."""
 
@@ -37,6 +39,8 @@ class Context:
         starts: start values by name.
         budget: time that one check may take [s]; checks that count on stop well before.
         steps: of the longest run.
+        ends: whether instances are terminated and freed. announce: called with the name of each call that ends one,
+            and with nothing after it.
     """
 
     folder: Path
@@ -46,6 +50,8 @@ class Context:
     starts: Mapping[str, float]
     budget: float
     steps: int
+    ends: bool = True
+    announce: Callable[[str], None] = lambda _what: None
 
     def slave(self, *, logging: bool = False) -> FmuSlave:
         """A fresh co-simulation instance, not yet instantiated. All have one name: what is drawn may follow from it.
@@ -53,11 +59,15 @@ class Context:
         Args:
             logging: whether the FMU is asked to log.
         """
-        return make_slave(self.folder, self.description, INSTANCE, logging=logging)
+        return self._announcing(make_slave(self.folder, self.description, INSTANCE, logging=logging))
 
     def model(self) -> FmuModel:
         """A fresh model exchange instance, not yet instantiated."""
-        return make_model(self.folder, self.description, INSTANCE)
+        return self._announcing(make_model(self.folder, self.description, INSTANCE))
+
+    def _announcing(self, instance: Made) -> Made:
+        instance.ends, instance.announce = self.ends, self.announce
+        return instance
 
     def instance(self, interface: str) -> FmuInstance:
         """A fresh instance of an interface type, not yet instantiated.
@@ -100,7 +110,8 @@ class Context:
     @property
     def only_once(self) -> bool:
         """Whether the FMU allows one instance per process only."""
-        return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
+        interface = self.description.coSimulation or self.description.modelExchange
+        return bool(interface.canBeInstantiatedOnlyOncePerProcess)
 
     def close(self) -> None:
         """Free the shared runner."""

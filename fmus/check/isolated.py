@@ -19,8 +19,10 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
+from time import monotonic
 from typing import IO, Any
 
+from fmus.check.check import END
 from fmus.check.findings import CheckFinding, Verdict
 from fmus.check.job import CheckJob
 from fmus.check.known_checks import CHECKS
@@ -38,6 +40,10 @@ PROCESSES = 32
 MEMORY = 4 * 1024**3
 """Memory that an FMU, its processes and Python may take together [bytes]."""
 
+_END_ADVICE = (
+    "give each run a process of its own: cosim run writes its results before it ends the FMU, and waits for that as "
+    "long as master.call_timeout says"
+)
 LEFT = "processes"
 _CONSOLE = "console output"
 SHOWN = 80
@@ -53,6 +59,7 @@ class _Child:
             ended, in words.
         crashed: whether it ended by itself or had to be stopped for what it took; not where it was silent.
         left: processes that it left running.
+        ending: the call that was ending an instance, empty where none was. only_once: no other instance may be made.
     """
 
     findings: list[CheckFinding] = field(default_factory=list)
@@ -60,6 +67,13 @@ class _Child:
     end: str = ""
     crashed: bool = True
     left: int = 0
+    ending: str = ""
+    only_once: bool = False
+
+    @property
+    def where(self) -> str:
+        """How it ended and in which call, where that is known."""
+        return f"{self.end} in {self.ending}" if self.ending else self.end
 
 
 def run_isolated(job: CheckJob, progress: Callable[[str], None] = lambda _: None) -> list[CheckFinding]:
@@ -83,8 +97,12 @@ def run_isolated(job: CheckJob, progress: Callable[[str], None] = lambda _: None
             if not left:
                 break
             lost = child.current or left[0]
+            if child.ending and job.ends and not child.only_once:
+                found = [*_others(found), CheckFinding(END, Verdict.LIMIT, child.where, _END_ADVICE)]
+                left, job = tuple(name for name in left if name != END), replace(job, ends=False)
+                continue  # the check itself is made anew, with instances that are left as they are
             check = CHECKS[lost]
-            found.append(check.lost(f"{child.end} in '{lost}'", crashed=child.crashed))
+            found.append(check.lost(f"{child.where} in '{lost}'", crashed=child.crashed))
             left = tuple(name for name in left if name != lost)
             if check.basis:
                 found += [unrun(name, lost) for name in left]
@@ -92,6 +110,10 @@ def run_isolated(job: CheckJob, progress: Callable[[str], None] = lambda _: None
         found += [_left(running), _console(console)]
     order = {name: place for place, name in enumerate(job.checks)}
     return sorted(found, key=lambda f: order.get(f.check, len(order)))
+
+
+def _others(findings: list[CheckFinding]) -> list[CheckFinding]:
+    return [finding for finding in findings if finding.check != END]
 
 
 def _run_child(job: CheckJob, console: IO[bytes], progress: Callable[[str], None]) -> _Child:
@@ -102,10 +124,10 @@ def _run_child(job: CheckJob, console: IO[bytes], progress: Callable[[str], None
         with suppress(OSError):  # a child that died at once is seen below
             process.stdin.write((job.to_json() + "\n").encode())
             process.stdin.close()
-        limit = _START_LIMIT
+        limit, since = _START_LIMIT, monotonic()
         while True:
             try:
-                line = lines.get(timeout=limit)
+                line = lines.get(timeout=max(since + limit - monotonic(), 0.0))
             except queue.Empty:
                 seen.end, seen.crashed = f"no answer within {limit:g} s", False
                 break
@@ -113,6 +135,10 @@ def _run_child(job: CheckJob, console: IO[bytes], progress: Callable[[str], None
             if line is None or "left" in message:
                 seen.end, seen.left = _ending(message), int(message.get("left", 0))
                 break
+            if "ending" in message:
+                seen.ending, seen.only_once = str(message["ending"]), bool(message["only_once"])
+                continue
+            since = monotonic()
             if "start" in message:
                 seen.current, limit = str(message["start"]), job.budget
                 progress(seen.current)

@@ -18,6 +18,7 @@ class CheckJob:
         step: communication step [s]. start_time: [s]. starts: start values by name.
         budget: time that one check may take [s]. steps: of the longest run.
         places: of checks that the program has registered, ``file.py:Class`` by name.
+        ends: whether instances are terminated and freed.
     """
 
     folder: str
@@ -29,6 +30,7 @@ class CheckJob:
     steps: int
     starts: Mapping[str, float] = field(default_factory=dict)
     places: Mapping[str, str] = field(default_factory=dict)
+    ends: bool = True
 
     def to_json(self) -> str:
         """As one line of text."""

@@ -55,10 +55,13 @@ def run(job: CheckJob, report: Callable[[dict[str, Any]], None]) -> None:
 
     Args:
         job: which checks of which FMU.
-        report: is called with ``{"start": name}`` before each check and with its finding after it.
+        report: is called with ``{"start": name}`` before each check, with its finding after it, and with ``{"ending":
+            call}`` before a call that ends an instance.
     """
     description = read_description(Path(job.folder))
-    context = Context(Path(job.folder), description, job.step, job.start_time, job.starts, job.budget, job.steps)
+    folder = Path(job.folder)
+    context = Context(folder, description, job.step, job.start_time, job.starts, job.budget, job.steps, job.ends)
+    context.announce = lambda call: report({"ending": call, "only_once": context.only_once})
     for name, place in job.places.items():
         try:
             CHECKS[name] = load_class(place, EXPECTED)

@@ -123,7 +123,12 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     return instance;
 }
 
-void fmi2FreeInstance(fmi2Component c) { free(c); }
+void fmi2FreeInstance(fmi2Component c) {
+#ifdef LIE_CRASH_FREED
+    *(volatile int *)(size_t)8 = 1;
+#endif
+    free(c);
+}
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real tol, fmi2Real start, fmi2Boolean sd, fmi2Real stop) {
     DATA(c).time = start;
     return fmi2OK;
@@ -135,7 +140,16 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 #endif
     return fmi2OK;
 }
-fmi2Status fmi2Terminate(fmi2Component c) { return fmi2OK; }
+fmi2Status fmi2Terminate(fmi2Component c) {
+#ifdef LIE_HANG_TERMINATED
+    for (;;)
+        pause();
+#endif
+#ifdef LIE_REFUSES_END
+    return fmi2Error;
+#endif
+    return fmi2OK;
+}
 fmi2Status fmi2Reset(fmi2Component c) {
     Instance *instance = c;
     instance->spoiled = 0.1;

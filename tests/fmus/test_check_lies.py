@@ -148,6 +148,33 @@ def test_a_parameter_that_is_bounded_is_named(tmp_path: Path) -> None:
     assert check_fmu(fmu).finding("values taken").verdict is PASS
 
 
+@pytest.mark.parametrize(
+    ("lie", "words"),
+    [
+        ("CRASH_FREED", "crashed with signal 11 (SIGSEGV) in freeInstance"),
+        ("HANG_TERMINATED", "no answer within 3 s in terminate"),
+    ],
+)
+def test_the_end_is_named_and_all_else_is_checked(lie: str, words: str, tmp_path: Path) -> None:
+    report = checked(tmp_path, lie, timeout=3.0)
+    assert problems(report) == {"terminate and free": words}
+    assert (report.verdict, report.finding("terminate and free").verdict) == (Class.LIMITS, LIMIT)
+    assert "Run it in a process of its own: it died or hung in terminate and free." in report.trust
+    assert report.finding("state in another instance").verdict is PASS
+
+
+def test_an_end_where_no_second_instance_is_allowed_is_named_too(tmp_path: Path) -> None:
+    once = description(SLAVE | {"canBeInstantiatedOnlyOncePerProcess": "true"})
+    report = checked(tmp_path, "CRASH_FREED", xml=once)
+    assert report.finding("initialise").detail == "crashed with signal 11 (SIGSEGV) in freeInstance in 'initialise'"
+
+
+def test_an_error_of_terminate_is_noted(tmp_path: Path) -> None:
+    report = checked(tmp_path, "REFUSES_END")
+    assert problems(report) == {"terminate and free": "terminate failed: fmi2Terminate failed with status 3 (error)"}
+    assert report.verdict is Class.USE
+
+
 def test_steps_that_must_be_refused(tmp_path: Path) -> None:
     report = checked(tmp_path, "ACCEPTS_ANYTHING")
     assert set(problems(report)) == {"negative step"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from statistics import median
 from time import perf_counter
 
@@ -159,7 +160,7 @@ class ExportedSymbolsCheck(Check, failing=LIMIT, advice=MISSING, place=2):
 
 
 class InitialiseCheck(Check, failing=DISTRUST, advice="give start values, if it needs some", basis=True, place=3):
-    """Instantiate, initialise, terminate, free."""
+    """Instantiate, initialise."""
 
     name = "initialise"
 
@@ -167,7 +168,22 @@ class InitialiseCheck(Check, failing=DISTRUST, advice="give start values, if it 
     def run(context: Context) -> CheckOutcome:
         with context.begun_runner():
             pass
-        return passed("instantiates, initialises, terminates and is freed")
+        return passed("instantiates and initialises")
+
+
+class EndCheck(Check, failing=NOTE, place=3.5):
+    """Terminate and free after some steps; where the process dies or hangs in one of these calls, it is a limit."""
+
+    name = "terminate and free"
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        with context.begun_runner() as runner:
+            with suppress(SlaveError):  # which another check reports
+                runner.steps((runner.h,) * WARM_UP_STEPS)
+            component = runner.component
+        failed_ends = component.failed_ends
+        return by("; ".join(failed_ends), "terminates after some steps, and is freed")
 
 
 class ValuesAtStartCheck(
