@@ -26,6 +26,7 @@ from cosim.report.page.observer_page import write_benchmark
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
 from cosim.results.results_folder import write_results
+from cosim.run.backends import Notify
 from cosim.run.component_models import make_system
 from cosim.run.expected_gaps import ExpectedGap, expected_gap
 from cosim.run.layouts import make_layout
@@ -38,7 +39,6 @@ from cosim.simulation.scenario import Scenario
 from fmu_observer.certificates.finding import Finding
 
 Progress = Callable[[str, int, int], None]
-Notify = Callable[[str], None]
 _MICROSECONDS = 1e6
 
 

@@ -16,15 +16,15 @@ from cosim.choice.ranking import Row, contenders, ranked
 from cosim.choice.rows import merged, row_of
 from cosim.choice.trial import Trial, require_any, tried
 from cosim.errors import ScenarioError
+from cosim.run.backends import Notify
 from cosim.runs.executors import Executor, make_executor
 from cosim.simulation.scenario import Scenario
 from cosim.starter.starter_file import starter
 
-SEEDS, FURTHER, HARDER = 4, 24, 2.0
+SEEDS, FURTHER, _HARDER = 4, 24, 2.0
 """Disturbed runs of all, so that each error has both signs; those that the best get besides; and how much larger all is
 in those that do not count."""
 Progress = Callable[[str, int, int], None]
-Notify = Callable[[str], None]
 
 
 def choose(
@@ -109,7 +109,7 @@ class _Search:
         """All rows on the seeds, what is safe also on harder ones, the best on further ones; in order."""
         self._round("disturbed", self._rows(), range(1, seeds + 1))
         rows = merged(self._rows())
-        self._round("harder", [row for row in rows if row.safe], range(1, seeds + 1), HARDER)
+        self._round("harder", [row for row in rows if row.safe], range(1, seeds + 1), _HARDER)
         kept = {row.score.name: row.also for row in rows}
         had: set[str] = set()
         while further and seeds and not self.stopped:

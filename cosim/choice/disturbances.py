@@ -17,7 +17,7 @@ _MOVES = 2.0  # [m/s]: below this speed no fault is drawn
 _APART = 5.0  # least time between two faults, longer than one of them: twice as long they are still apart [s]
 _BELIEVED = 1.8  # most that the error of a resistance is enlarged by, so that a resistance is left
 _MOST = 4  # faults of a kind in a run
-HARDER = "harder"
+_HARDER = "harder"
 """What the names of those begin with that do not count."""
 _SIGNS = ((1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))
 """Of the errors of mass, resistance and wheel, for one seed after the other."""
@@ -90,7 +90,7 @@ class Disturbance:
         """
         return replace(
             self,
-            name=f"{HARDER} {self.name}",
+            name=f"{_HARDER} {self.name}",
             mass=1.0 + factor * (self.mass - 1.0),
             resistance=1.0 + min(factor, _BELIEVED) * (self.resistance - 1.0),
             wheel=1.0 + factor * (self.wheel - 1.0),
@@ -103,7 +103,7 @@ class Disturbance:
     @property
     def harder(self) -> bool:
         """Whether it is one of those that do not count."""
-        return self.name.startswith(HARDER)
+        return self.name.startswith(_HARDER)
 
     def cause(self, time: float) -> str:
         """What acts at an instant [s], in words.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from time import monotonic
 
-EVERY = 30.0
+_EVERY = 30.0
 """Time between two lines [s]."""
 
 
@@ -29,6 +29,6 @@ class ProgressLines:
         now = monotonic()
         if now < self._next:
             return
-        self._next = now + EVERY
+        self._next = now + _EVERY
         counted = f"{done:.6g} of {total:.6g} {self._unit}s done after {now - self._begin:.0f} s"
         print(f"{counted}: {what}" if what else counted, file=sys.stderr, flush=True)
