@@ -16,7 +16,6 @@ from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.described import DescribedComponent
 from cosim.components.start_values import StartValue
-from cosim.components.surroundings import Surroundings
 from cosim.diagnostics.call_statistics import CallStatistics, count_methods
 from cosim.diagnostics.messages import LogChoice, MessageLog
 from cosim.errors import CouplingError, RunError, nearest
@@ -27,6 +26,7 @@ from fmus.fmi.derivatives import input_derivative_writer
 from fmus.fmi.elements import described
 from fmus.fmi.instance import shown
 from fmus.fmi.slave import Slave
+from fmus.fmi.surroundings import Surroundings
 from fmus.fmi.types import FLOATING_TYPES
 from fmus.fmi.values import element_reader, signs, write_start
 from plant_models.hybrid.missing import MISSED_SAMPLES

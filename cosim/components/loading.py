@@ -20,7 +20,6 @@ from fmpy.model_description import ModelDescription
 from cosim.components.component import Component
 from cosim.components.description import open_fmu, read_description
 from cosim.components.fmi3 import FMI3Component
-from cosim.components.surroundings import Surroundings
 from cosim.components.unpacking import unpack
 from cosim.errors import CouplingError, FmuLoadError, ScenarioError
 from cosim.process.exit_guard import guard_exit
@@ -33,6 +32,7 @@ from fmus.fmi.fmi1 import FMI1Slave
 from fmus.fmi.fmi2 import FMI2Slave
 from fmus.fmi.library import load
 from fmus.fmi.standard import CO_SIMULATION, fmi_version
+from fmus.fmi.surroundings import Surroundings
 from plant_models.hybrid import HybridSystem, TracingError
 
 _LINK_MAP = 2  # dlinfo: RTLD_DI_LINKMAP

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from cosim.components.component import Component
-from cosim.components.surroundings import SurroundingsOfSteps
 from cosim.coupling.connection import Connection
 from cosim.diagnostics.call_log import CallLog
 from cosim.diagnostics.messages import FAULTS, in_order
@@ -35,6 +34,7 @@ from cosim.run.summary import evaluated_summary, run_summary
 from cosim.run.values_not_taken import values_not_taken
 from cosim.structure.divergence import explained_failure
 from fmu_observer.annotated_variable import declared_warnings
+from fmus.fmi.surroundings import SurroundingsOfSteps
 from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.signal import OutputWarning
 

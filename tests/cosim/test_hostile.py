@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import locale
 import mmap
 import os
 import signal
@@ -20,7 +21,6 @@ from test_fmus.events import DEEDS, hostile_fmu
 from cosim import CosimError, Scenario, load_result
 from cosim.cli import main
 from cosim.compiled.library import stepper_library
-from cosim.components import surroundings
 from cosim.components.loading import FMI2Component
 from cosim.process import exit_guard, watch
 from cosim.process.interruption import STOPPING, ends_like_ctrl_c
@@ -28,6 +28,7 @@ from cosim.process.last_call import LAST_CALL, PAGE, TEXTS, USED, LastCall, make
 from cosim.runs.run import Run
 from cosim.runs.workers import Team
 from fmus import cache
+from fmus.fmi import surroundings
 from fmus.toolchain.compile import find_compiler
 from plant_models import PLANTS
 from plant_models.disk_cache.files import seal
@@ -293,14 +294,24 @@ def test_words_run_out_without_harm(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("deed", "what"), [("moves", "the working directory"), ("rounds", "the rounding of floating-point numbers")]
+    ("deed", "what"),
+    [
+        ("moves", "the working directory"),
+        ("rounds", "the rounding of floating-point numbers"),
+        ("closes", "the standard streams"),
+        ("deafens", "the response to Ctrl-C"),
+        ("localises", "the locale"),
+    ],
 )
 @pytest.mark.parametrize("stepper", ["python", "compiled"])
 def test_what_an_fmu_changes_for_all_is_put_back_and_reported(
     fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, deed: str, what: str, stepper: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    before, language = surroundings.Surroundings(), locale.setlocale(locale.LC_ALL)
     assert main(["run", saved(fmu, tmp_path, deed, stepper=stepper), "--out", "out", "--no-report", "--quiet"]) == 0
+    assert before.put_back() == []
+    assert locale.setlocale(locale.LC_ALL) == language
     assert Path.cwd() == tmp_path
     assert 0.1 + 0.2 == 0.30000000000000004 and -0.1 - 0.2 == -0.30000000000000004  # noqa: PT018 - rounded to nearest
     warnings = load_result(tmp_path / "out").summary["warnings"]

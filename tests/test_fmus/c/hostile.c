@@ -4,12 +4,13 @@
 #include "test_fmus.h"
 
 #include <fenv.h>
+#include <locale.h>
 #include <signal.h>
 #include <unistd.h>
 
 enum {
     NOTHING, EXITS, EXITS_AT_ONCE, CRASHES, HANGS, CRASHES_FREED, CRASHES_TERMINATED, EXITS_FREED, MOVES, ROUNDS, PAINTS, INTERRUPTS,
-    BOUNDS, OVERWRITES, WARNS, HANGS_FREED, HANGS_TERMINATED, FAILS_TERMINATED,
+    BOUNDS, OVERWRITES, WARNS, HANGS_FREED, HANGS_TERMINATED, FAILS_TERMINATED, CLOSES, DEAFENS, LOCALISES,
 };
 #define BOUND 0.3 /* of BOUNDS: `at` is no later */
 
@@ -59,6 +60,9 @@ static void do_harm(Host *host, int deed) {
     case MOVES: if (chdir("/") != 0) abort(); break;
     case ROUNDS: fesetround(FE_UPWARD); break;
     case PAINTS: SAY(host, WARNING, "logStatusWarning", "\033]0;owned\007\033[31mred"); break;
+    case CLOSES: close(1); break;
+    case DEAFENS: signal(SIGINT, SIG_IGN); break;
+    case LOCALISES: setlocale(LC_ALL, "C"); break;
     case INTERRUPTS: kill(getpid(), SIGINT); break;
     default: break;
     }
