@@ -128,7 +128,7 @@ def benchmark_observers(
             lambda what, done: report(what, min(done + 1, total), total),
             building,
         )
-        interrupted = _run(runs, [believing(candidate, wrong) for candidate in candidates])
+        interrupted = _run(runs, [believing(c, wrong, scenario.folder) for c in candidates])
         report("done", total, total)
     evaluation = _Evaluation.of(scenario, parts, result, allowance or Allowance())
     return evaluation.benchmark(candidates, runs.found, notes, wrong, interrupted=interrupted)

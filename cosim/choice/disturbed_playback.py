@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from cosim.choice.candidates import BenchmarkCandidate
@@ -12,9 +13,11 @@ from cosim.choice.known_parameters import MASS, Known
 from cosim.choice.playback import ScenarioParts, connection
 from cosim.coupling.connection import Link
 from cosim.coupling.transformation import Transformation
+from cosim.errors import CosimError
 from cosim.run.component_models import make_system, values_in_use
 from cosim.run.connections import parse_connections, recorded_link, transformation
 from cosim.scenario.scenario_tables import ConnectionTable
+from cosim.starter.inspected_fmu import inspect_fmu
 from cosim.starter.train_starter import DAVIS
 
 _EFFORT, _WHEEL, _ODOMETER = "disturbed_effort", "disturbed_wheel", "disturbed_odometer"
@@ -133,26 +136,38 @@ def _source(line: str | dict[str, Any]) -> str:
     return str(line["from"]) if isinstance(line, dict) else line.partition(" -> ")[0]
 
 
-def believing(candidate: BenchmarkCandidate, disturbance: Disturbance) -> BenchmarkCandidate:
+def believing(candidate: BenchmarkCandidate, disturbance: Disturbance, folder: Path) -> BenchmarkCandidate:
     """An observer that believes in another mass and resistance; one that knows neither as it is.
 
     Args:
-        candidate: the observer. disturbance: what it believes wrongly.
+        candidate: the observer. disturbance: what it believes wrongly. folder: of the scenario, for paths of FMUs.
     """
     table = candidate.table
-    system = None if table.observer is None else make_system(table, candidate.name)
-    if system is None:
-        known: Mapping[str, Any] = table.parameters
-    else:
-        scalars = {signal.name for signal in system.parameter_signals if signal.size is None}
-        try:
-            values = values_in_use(table, system)
-        except ValueError:  # it refuses what is known of the train, and its run says so
-            return candidate
-        known = {name: float(getattr(values, name)) for name in (MASS, *DAVIS) if name in scalars}
+    try:
+        known = _believed(candidate, folder)
+    except (ValueError, CosimError):  # it refuses what is known of the train, and its run says so
+        return candidate
     shares = {MASS: disturbance.mass, **dict.fromkeys(DAVIS, disturbance.resistance)}
     changed = {
         n: share * known[n] for n, share in shares.items() if share != 1.0 and isinstance(known.get(n), int | float)
     }
     parameters = {**table.parameters, **changed}
     return replace(candidate, table=table.model_copy(update={"parameters": parameters}))
+
+
+def _believed(candidate: BenchmarkCandidate, folder: Path) -> Mapping[str, Any]:
+    """What an observer is set to, or what it is as it stands, of mass and resistance among others.
+
+    Raises:
+        ValueError: it refuses a value. CosimError: its FMU cannot be read.
+    """
+    table = candidate.table
+    if table.fmu is not None:
+        signals = inspect_fmu((folder / table.fmu).resolve()).parameters
+        return {s.name: s.start for s in signals if s.name in (MASS, *DAVIS)} | table.parameters
+    system = None if table.observer is None else make_system(table, candidate.name)
+    if system is None:
+        return table.parameters
+    scalars = {signal.name for signal in system.parameter_signals if signal.size is None}
+    values = values_in_use(table, system)
+    return {name: float(getattr(values, name)) for name in (MASS, *DAVIS) if name in scalars}

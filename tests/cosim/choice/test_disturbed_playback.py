@@ -14,12 +14,15 @@ from test_fmus.build import linear_fmu
 
 from cosim import Scenario
 from cosim.choice.benchmark import benchmark_observers
-from cosim.choice.candidates import find_candidates
+from cosim.choice.candidates import BenchmarkCandidate, find_candidates
 from cosim.choice.disturbances import GRAVITY, Disturbance, Journey, OdometerFault, Slope
 from cosim.choice.disturbed_playback import believing
 from cosim.choice.known_parameters import derived_parameters, stated_parameters
 from cosim.choice.playback import find_parts
 from cosim.results.result import Result, SignalInfo
+from cosim.scenario.scenario_tables import ComponentTable
+from fmu_observer import OBSERVERS
+from fmus.cache import cached_fmu
 
 HEARD = ["odometer_reset", "takagi_sugeno_cdo:long_gaps"]
 
@@ -68,10 +71,21 @@ def test_a_slope_is_an_effort_that_moves_nothing() -> None:
 def test_observers_believe_in_another_mass_also_where_it_is_their_default() -> None:
     scenario = small()
     found, _ = find_candidates(scenario, find_parts(scenario), ["observer", "odometer_reset"], {})
-    own, plain = (believing(c, Disturbance(mass=1.2, resistance=0.5)).table.parameters for c in found)
+    own, plain = (believing(c, Disturbance(mass=1.2, resistance=0.5), Path()).table.parameters for c in found)
     assert own["mass"] == pytest.approx(1.2 * 90e3)
     assert own["davis_a"] == pytest.approx(450.0)
     assert "mass" not in plain
+
+
+def test_an_observer_that_is_an_fmu_believes_in_another_mass_too(tmp_path: Path) -> None:
+    """As its start value where the scenario sets none; in the FMU's own unit."""
+    fmu: Any = cached_fmu(OBSERVERS["takagi_sugeno_cdo"](), fmi_version=3)
+    table = ComponentTable.model_validate({"fmu": str(fmu), "parameters": {"davis_a": 1000.0}})
+    one = BenchmarkCandidate("mine", table, {}, "scenario")
+    found = believing(one, Disturbance(mass=1.2, resistance=0.5), tmp_path).table.parameters
+    assert found["mass"] == pytest.approx(1.2 * 90e3)
+    assert found["davis_a"] == pytest.approx(500.0)
+    assert believing(one, Disturbance(), tmp_path) == one
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
