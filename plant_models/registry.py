@@ -112,6 +112,16 @@ class Registry(MutableMapping[str, T], Generic[T]):
         """
         return self._own.get(name)
 
+    def targets(self, name: str) -> list[str]:
+        """What a name stands for, ``module:Class``, without importing it; more than one where it is taken twice.
+
+        Args:
+            name: of a member; none for one that is unknown.
+        """
+        if name in self._own:
+            return [f"{self._own[name].__module__}:{getattr(self._own[name], '__qualname__', '')}"]
+        return [member.target for member in self.members.get(name, [])]
+
     def usable(self, left_out: Callable[[str, str], None] = log_left_out) -> dict[str, T]:
         """The members that can be loaded, by name.
 
