@@ -21,7 +21,8 @@ from page_tables import write_table
 
 from fmu_observer.formulas.filtering.square_root import factor
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost, arrival_cost_at
-from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolution, FullSolver
+from fmu_observer.formulas.moving_horizon.full_solution import Effort, FullSolution
+from fmu_observer.formulas.moving_horizon.full_solver import FullSolver
 from fmu_observer.formulas.moving_horizon.gauss_newton import passed
 from fmu_observer.formulas.moving_horizon.row_window import WindowRow
 from fmu_observer.formulas.moving_horizon.window_program import Programme, WindowProgram

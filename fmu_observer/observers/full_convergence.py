@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from fmu_observer.formulas.moving_horizon.arrival_cost import arrival_cost_from
-from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolver
+from fmu_observer.formulas.moving_horizon.full_solution import Effort
+from fmu_observer.formulas.moving_horizon.full_solver import FullSolver
 from fmu_observer.formulas.moving_horizon.gauss_newton import passed
 from fmu_observer.formulas.moving_horizon.real_time_iteration import WINDOW_MEMORY, Iterated, contradicted, unsettled
 from fmu_observer.formulas.moving_horizon.window_problem import WindowProblem

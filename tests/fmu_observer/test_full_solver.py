@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from fmu_observer.formulas.moving_horizon import gauss_newton
 from fmu_observer.formulas.moving_horizon.arrival_cost import ArrivalCost, arrival_cost_at
-from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolver, WindowError
+from fmu_observer.formulas.moving_horizon.full_solution import Effort, WindowError
+from fmu_observer.formulas.moving_horizon.full_solver import FullSolver
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout
 from fmu_observer.formulas.moving_horizon.window_problem import Limits, Moved, Seen, WindowProblem
 from fmu_observer.formulas.moving_horizon.window_program import WindowProgram, _SweptProgram

@@ -21,7 +21,8 @@ from own_condition import own_condition
 from fmu_observer import OBSERVERS
 from fmu_observer.formulas.moving_horizon import robust_loss
 from fmu_observer.formulas.moving_horizon.arrival_cost import arrival_cost_at
-from fmu_observer.formulas.moving_horizon.full_solver import Effort, FullSolver
+from fmu_observer.formulas.moving_horizon.full_solution import Effort
+from fmu_observer.formulas.moving_horizon.full_solver import FullSolver
 from fmu_observer.formulas.moving_horizon.gauss_newton import passed, solve
 from fmu_observer.formulas.moving_horizon.real_time_iteration import contradicted, iterate, unsettled
 from fmu_observer.formulas.moving_horizon.row_window import RowLayout, WindowRow

@@ -15,7 +15,8 @@ from failing_models import WORDS
 from cosim import Scenario, benchmark_observers
 from cosim.diagnostics.messages import MessageLog
 from cosim.errors import CosimError
-from fmu_observer.formulas.moving_horizon.full_solver import FullSolver, WindowError
+from fmu_observer.formulas.moving_horizon.full_solution import WindowError
+from fmu_observer.formulas.moving_horizon.full_solver import FullSolver
 from fmus.hosted import build_hosted_fmu
 
 FILE = failing_models.__file__

@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import reduce
+from types import SimpleNamespace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -290,7 +291,8 @@ class GaussianFilter(GatedObserver, EvaluatedObserver):
         """Whether the filter linearised at the start of the estimates has a stable steady state."""
         start, period = self.model.start, float(p.sample_period)
         inputs = self.model.start_inputs
-        known = Known(0.0, inputs, np.asarray(self.known(0.0, _Starts(self.model.inputs), p).p, dtype=float))
+        starts = SimpleNamespace(**{s.name: float(s.start_values[0]) for s in self.model.inputs})
+        known = Known(0.0, inputs, np.asarray(self.known(0.0, starts, p).p, dtype=float))
         r, s = self.model.noise_count, self.model.reading_noise_count
         if self.arrivals.timed:
             noise = np.asarray(self._noise_of_density(start, known, period, p))
@@ -394,11 +396,3 @@ def _replaced(e: Array, S: Array, rows: Sequence[int], error: Array, found: Arra
         for j in range(q)
     ]
     return vector(*innovations), as_matrix(vector(*entries), q, q)
-
-
-class _Starts:
-    """Start values of signals as attributes, in place of the inputs of a run."""
-
-    def __init__(self, signals: Sequence[Signal]) -> None:
-        for s in signals:
-            setattr(self, s.name, float(s.start_values[0]))
