@@ -95,12 +95,17 @@ def test_any_stamps_in_one_step(
     np.testing.assert_array_equal(made.values(), expected.values())
 
 
-def test_event_without_stamp_happens_now(
-    version: int, component: Callable[..., Any], reference: Callable[[str], Any]
-) -> None:
+@pytest.fixture
+def tracked(version: int, component: Callable[..., Any], reference: Callable[[str], Any]) -> tuple[Any, Any]:
+    """An FMU of the tracker and its reference, initialised."""
     made, expected = component("tracker", version), reference("tracker")
     made.initialize()
     expected.initialize()
+    return made, expected
+
+
+def test_event_without_stamp_happens_now(tracked: tuple[Any, Any]) -> None:
+    made, expected = tracked
     made.step(0.0, 0.3)
     expected.runtime.advance(0.3)
     made.event("balise", balise_position=7.0)
@@ -118,12 +123,8 @@ def test_fmi3_jump_is_seen_before_the_next_step(component: Callable[..., Any]) -
     np.testing.assert_array_equal(made.get("position", "innovation_out"), [7.0, 10.0])  # gain 0.7
 
 
-def test_event_ahead_waits_for_its_step(
-    version: int, component: Callable[..., Any], reference: Callable[[str], Any]
-) -> None:
-    made, expected = component("tracker", version), reference("tracker")
-    made.initialize()
-    expected.initialize()
+def test_event_ahead_waits_for_its_step(tracked: tuple[Any, Any]) -> None:
+    made, expected = tracked
     made.event("balise", stamp=0.25, balise_position=9.0)
     made.step(0.0, 0.1)
     assert made.get("innovation") == 0.0

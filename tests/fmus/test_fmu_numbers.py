@@ -25,14 +25,18 @@ def test_every_fmu_is_valid(system: HybridSystem, version: int) -> None:
     assert validate_fmu(str(cached_fmu(system, version))) == []  # type: ignore[arg-type]
 
 
+@pytest.fixture
+def pair(
+    version: int, component: Callable[..., Any], reference: Callable[[str], Any]
+) -> Callable[[str], tuple[Any, Any]]:
+    """The reference of a system and its FMU, by name."""
+    return lambda name: (reference(name), component(name, version))
+
+
 def test_fmu_and_runtime_agree(
-    system_name: str,
-    version: int,
-    component: Callable[..., Any],
-    reference: Callable[[str], Any],
-    drive: Callable[..., np.ndarray],
+    system_name: str, pair: Callable[[str], tuple[Any, Any]], drive: Callable[..., np.ndarray]
 ) -> None:
-    expected, made = reference(system_name), component(system_name, version)
+    expected, made = pair(system_name)
     expected.initialize()
     made.initialize()
     h = min(0.013, 13.0 * _shortest_period(expected.system))
@@ -51,15 +55,10 @@ def _shortest_period(system: HybridSystem) -> float:
 @pytest.mark.parametrize("name", ["oscillator", "slider", "sampler", "tracker"])
 @pytest.mark.parametrize("first", [100, 10**8])  # from 1.3 s, and from 1.3e6 s where times have gaps of 2e-10 s
 def test_agreement_is_bit_for_bit_from_a_late_start(
-    name: str,
-    first: int,
-    version: int,
-    component: Callable[..., Any],
-    reference: Callable[[str], Any],
-    drive: Callable[..., np.ndarray],
+    name: str, first: int, pair: Callable[[str], tuple[Any, Any]], drive: Callable[..., np.ndarray]
 ) -> None:
     # These use + - * / and the C library's sin, cos, log, sqrt, which Python's math and CasADi call as well.
-    expected, made = reference(name), component(name, version)
+    expected, made = pair(name)
     expected.initialize(0.013 * first)
     made.initialize(0.013 * first)
     np.testing.assert_array_equal(drive(made, 0.013, 300, first), drive(expected, 0.013, 300, first))
