@@ -131,22 +131,18 @@ def fault_detection(result: Result, spec: ReportSpec) -> list[FaultDetection]:
 
 
 def _evaluated_detections(
-    faults: Sequence[Interval],
-    detections: Sequence[Interval],
-    end: float,
-    grace: float = GRACE,
-    delay_limit: float | None = None,
+    faults: Sequence[Interval], detections: Sequence[Interval], end: float, delay_limit: float | None = None
 ) -> tuple[list[float], list[float], int]:
     """Which detections belong to which faults.
 
-    A detection belongs to the fault in which it *begins*, the fault taken to last `grace` longer, though not beyond the
+    A detection belongs to the fault in which it *begins*, the fault taken to last `GRACE` longer, though not beyond the
     begin of the next; one that was on before is none of it, however long it lasts. A fault is detected where one of its
     detections begins within the delay limit; it begins with the first of them and ends with the last. A detection in a
     fault that begins later than that is late, and not false.
 
     Args:
         faults: true intervals [s], in order. detections: indicated intervals [s], in order. end: of the run [s].
-        grace: see above [s]. delay_limit: longest delay [s]; None for none.
+        delay_limit: longest delay [s]; None for none.
 
     Returns:
         Delays of the detected faults at their start and at their end [s], and the number of false detections.
@@ -154,13 +150,13 @@ def _evaluated_detections(
     starts, ends, matched = [], [], set()
     for number, (a, b) in enumerate(faults, 1):
         next_begin = faults[number][0] if number < len(faults) else inf
-        last_begin = min(b + grace, next_begin - _SEPARATE)
+        last_begin = min(b + GRACE, next_begin - _SEPARATE)
         own = [k for k, (c, _) in enumerate(detections) if a - _SEPARATE <= c <= last_begin]
         matched |= set(own)
         if own and (delay_limit is None or detections[own[0]][0] <= a + delay_limit + _SEPARATE):
             starts.append(max(detections[own[0]][0] - a, 0.0))
             last = detections[own[-1]][1]
-            ends.append(inf if last >= end - _SEPARATE and last > b + grace else last - b)
+            ends.append(inf if last >= end - _SEPARATE and last > b + GRACE else last - b)
     return starts, ends, len(detections) - len(matched)
 
 

@@ -131,20 +131,19 @@ def condition_found(
     statement: str,
     source: str,
     kind: Kind = "sufficient",
-    what: str = "existence and stability",
 ) -> Finding:
     """Whether a condition holds for the model and the gains in use.
 
     Args:
         holds: whether it does. numbers: it was evaluated by, by name and unit: ``abscissa [1/s]``, ``rank``.
         statement: the condition in words, with the names of the numbers. source: equation or theorem.
-        kind: ``exact`` where it is necessary too. what: the condition is of.
+        kind: ``exact`` where it is necessary too.
     """
     parts = []
     for key, value in numbers.items():
         name, _, unit = key.partition(" [")
         parts.append(Finding(name, float(value), unit.rstrip("]") or "1", "exact", ""))
-    return Finding(what, nan, "1", kind, source, bool(holds), statement, tuple(parts))
+    return Finding("existence and stability", nan, "1", kind, source, bool(holds), statement, tuple(parts))
 
 
 def remark(statement: str) -> Finding:

@@ -164,10 +164,10 @@ def evaluate(
     return Consistency(of_one, mean, len(values), independent, inside, band, verdict)
 
 
-def _is_inside(squares: np.ndarray, degrees: float | np.ndarray, level: float = _POINTWISE) -> np.ndarray:
+def _is_inside(squares: np.ndarray, degrees: float | np.ndarray) -> np.ndarray:
     """Which samples lie inside the band of one, shape (rows,)."""
     few, place = np.unique(degrees, return_inverse=True)  # of mostly equal ones, each of which takes microseconds
-    low, high = (quantile(few, share)[place] for share in _tails(level))
+    low, high = (quantile(few, share)[place] for share in _tails(_POINTWISE))
     return np.asarray((squares >= low) & (squares <= high))
 
 
