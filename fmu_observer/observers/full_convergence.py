@@ -21,7 +21,7 @@ from fmu_observer.formulas.moving_horizon.real_time_iteration import WINDOW_MEMO
 from fmu_observer.formulas.moving_horizon.window_problem import WindowProblem
 from fmu_observer.observers.generic.discrete.moving_horizon_observer import MovingHorizonObserver
 from fmu_observer.observers.train.balise_moving_horizon import BaliseMovingHorizon
-from plant_models.hybrid import Array, discrete_output, memory, warning_output
+from plant_models.hybrid import Array, HybridSystem, discrete_output, memory, warning_output
 from plant_models.hybrid.option import is_number, require_whole
 
 TOLERANCE, _MAX_ITERATIONS = 1e-4, 30  # of a standard deviation: nobody sees it, and one step less is done [ours]
@@ -47,7 +47,32 @@ _LAST_SEARCH = memory("last_search", "1", 0.0, "How the last search ended", size
 _EFFORT_OPTIONS: Mapping[str, Sequence[Any]] = {"tolerance": (), "max_iterations": range(1, 1001), "deadline": ()}
 
 
-class FullMovingHorizonObserver(MovingHorizonObserver):
+class _Converging(HybridSystem):
+    """Solves every window until nothing moves any more, or until its effort is spent; what both observers share."""
+
+    traceable = False
+
+    def __init__(
+        self,
+        *,
+        tolerance: float = TOLERANCE,
+        max_iterations: int = _MAX_ITERATIONS,
+        deadline: float | None = None,
+        **options: Any,
+    ) -> None:
+        self.effort = _checked_effort(self.name, tolerance, max_iterations, deadline)
+        super().__init__(**options)
+        self.options |= _effort_options(self.effort)
+
+    def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:
+        """See `_iterated_fully`."""
+        return _iterated_fully(problem, self.effort, *arrays)
+
+    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
+        return super().output(t, x, u, p) | _ended(x)
+
+
+class FullMovingHorizonObserver(_Converging, MovingHorizonObserver):
     """`MovingHorizonObserver` with every window solved until nothing moves any more, and with a deadline.
 
     The output `passes_used` counts the steps. Where they end before the tolerance, by `max_iterations` or `deadline`,
@@ -66,28 +91,10 @@ class FullMovingHorizonObserver(MovingHorizonObserver):
     name = "full_moving_horizon_observer"
     description = "Moving-horizon observer whose windows are solved to convergence"
     source = "Omar 2012, sections 1.4.8 and 4.2; solver and arrival cost are ours"
-    traceable = False
     option_choices = {**MovingHorizonObserver.option_choices, **_EFFORT_OPTIONS}
 
-    def __init__(
-        self,
-        model: Any = "pendulum",
-        *,
-        tolerance: float = TOLERANCE,
-        max_iterations: int = _MAX_ITERATIONS,
-        deadline: float | None = None,
-        **options: Any,
-    ) -> None:
-        self.effort = _checked_effort(self.name, tolerance, max_iterations, deadline)
-        super().__init__(model, **options)
-        self.options |= _effort_options(self.effort)
-
-    def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:
-        """See `_iterated_fully`."""
-        return _iterated_fully(problem, self.effort, *arrays)
-
-    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        return super().output(t, x, u, p) | _ended(x)
+    def __init__(self, model: Any = "pendulum", **options: Any) -> None:
+        super().__init__(model=model, **options)
 
     def _declare(self) -> None:
         super()._declare()
@@ -95,7 +102,7 @@ class FullMovingHorizonObserver(MovingHorizonObserver):
         self.outputs += ENDED
 
 
-class FullBaliseMovingHorizon(BaliseMovingHorizon):
+class FullBaliseMovingHorizon(_Converging, BaliseMovingHorizon):
     """`BaliseMovingHorizon` with every window solved until nothing moves any more, and with a deadline.
 
     See `FullMovingHorizonObserver` for what `converged`, `deadline_missed` and `feasible` say.
@@ -111,32 +118,12 @@ class FullBaliseMovingHorizon(BaliseMovingHorizon):
     name = "full_balise_moving_horizon"
     description = "Moving-horizon observer of odometer and balises whose windows are solved to convergence"
     source = "Omar 2012, (1.4.78), (4.2.2)-(4.2.4); solver and the train case are ours"
-    traceable = False
     internal_step = 0.1  # [s]; it flows in Python, and the resistance hardly changes in that time
     outputs = (*BaliseMovingHorizon.outputs, *ENDED)
     option_choices = {**BaliseMovingHorizon.option_choices, **_EFFORT_OPTIONS}
 
-    def __init__(
-        self,
-        *,
-        tolerance: float = TOLERANCE,
-        max_iterations: int = _MAX_ITERATIONS,
-        deadline: float | None = None,
-        **options: Any,
-    ) -> None:
-        self.effort = _checked_effort(self.name, tolerance, max_iterations, deadline)
-        super().__init__(**options)
-        self.options |= _effort_options(self.effort)
-
     def own_states(self) -> tuple[Any, ...]:
         return (*super().own_states(), _LAST_SEARCH)
-
-    def iterate(self, problem: WindowProblem, passes: int, *arrays: Array) -> Iterated:
-        """See `_iterated_fully`."""
-        return _iterated_fully(problem, self.effort, *arrays)
-
-    def output(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
-        return super().output(t, x, u, p) | _ended(x)
 
 
 def _iterated_fully(
