@@ -136,8 +136,8 @@ def _spreads(result: SweepRuns) -> str:
     unit = f" {first.unit}" if first.unit else ""
     if len(found) == 1:
         _, column, *numbers = found[0]
-        low, middle, high = map(column.cell, numbers)
-        return f" {column.heading}: {middle}{unit} in the median, {low} to {high}{unit}."
+        least, median, most = map(column.cell, numbers)
+        return f" {column.heading}: {median}{unit} in the median, {least} to {most}{unit}."
     found.sort(key=lambda entry: entry[0])
     listed = [f"{c.key.rpartition('.')[0]} {c.cell(low)} to {c.cell(high)}{unit}" for _, c, low, _, high in found]
     more = [f"{len(listed) - _SPREADS} more"] if len(listed) > _SPREADS else []
