@@ -93,10 +93,18 @@ def _distance(_carry: Any, curve: Any, shared: Any) -> Any:
     """Distance of a point from one polygonal line."""
     along = [values[1:] - values[:-1] for values in curve]
     to = [shared[0][i] - curve[i][:-1] for i in range(2)]
+    return (), (np.stack([np.sqrt(np.min(_nearest(along, to)[0]))]),)
+
+
+def _nearest(along: Sequence[Array], to: Sequence[Array]) -> tuple[Array, Array]:
+    """Squared distance of a point from a segment, and where on it the nearest point is, from 0 to 1.
+
+    Args:
+        along: from the begin of the segment to its end. to: from its begin to the point.
+    """
     share = (to[0] * along[0] + to[1] * along[1]) / (along[0] * along[0] + along[1] * along[1] + _TINY)
     share = np.clip(share, 0.0, 1.0)
-    square = (to[0] - share * along[0]) ** 2 + (to[1] - share * along[1]) ** 2
-    return (), (np.stack([np.sqrt(np.min(square))]),)
+    return (to[0] - share * along[0]) ** 2 + (to[1] - share * along[1]) ** 2, share
 
 
 def place_on_curve(nodes: np.ndarray, curve: Array, point: Array) -> Array:
@@ -108,9 +116,7 @@ def place_on_curve(nodes: np.ndarray, curve: Array, point: Array) -> Array:
     best: tuple[Array, ...] | None = None
     for i in range(len(nodes) - 1):
         along, to = [curve[k, i + 1] - curve[k, i] for k in range(2)], [point[k] - curve[k, i] for k in range(2)]
-        share = (to[0] * along[0] + to[1] * along[1]) / (along[0] * along[0] + along[1] * along[1] + _TINY)
-        share = np.clip(share, 0.0, 1.0)
-        square = (to[0] - share * along[0]) ** 2 + (to[1] - share * along[1]) ** 2
+        square, share = _nearest(along, to)
         found = (square, nodes[i] + share * (nodes[i + 1] - nodes[i]))
         best = (
             found if best is None else tuple(np.where(square < best[0], a, b) for a, b in zip(found, best, strict=True))
