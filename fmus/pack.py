@@ -6,8 +6,9 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
+
+from plant_models.disk_cache.entries import whole_file
 
 _TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 """Of every file in an FMU: the earliest a zip file can hold."""
@@ -57,20 +58,12 @@ def pack_fmu(files: Mapping[str, bytes], target: Path) -> Path:
         OSError: it cannot be written, for example to a full disk; names the target, and an older file there is as it
         was.
     """
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=".part", dir=target.parent)
-    draft = Path(name)
     try:
-        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        with whole_file(target, 0o644) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
             for inner in sorted(files):
                 archive.writestr(_entry(inner), files[inner], compresslevel=9)
-        draft.chmod(0o644)
-        draft.replace(target)
     except OSError as error:  # a full disk does not say which file it was
         raise OSError(error.errno, f"{error.strerror or error}; the FMU was not written", str(target)) from error
-    finally:
-        with suppress(FileNotFoundError):
-            draft.unlink()
     return target
 
 

@@ -7,10 +7,10 @@ import json
 import logging
 import os
 import tempfile
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from plant_models.disk_cache.folder import cache_folder
 
@@ -73,7 +73,8 @@ def keep(kind: str, key: str, value: Any) -> Any:
     text = json.dumps(value)
     head = {"format": FORMAT, "kind": kind, "key": key, "sha256": _digest(text.encode())}
     try:
-        write_whole(_entry_path(kind, key), f"{json.dumps(head)}\n{text}\n".encode())
+        with whole_file(_entry_path(kind, key)) as stream:
+            stream.write(f"{json.dumps(head)}\n{text}\n".encode())
     except OSError as error:
         LOG.info("Nothing is kept in the cache: %s", error)
     return json.loads(text)
@@ -84,24 +85,27 @@ def _entry_path(kind: str, key: str) -> Path:
     return cache_folder() / kind / f"{key}.json"
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file all or not at all, beside others that write the same one.
+@contextmanager
+def whole_file(path: Path, rights: int = 0o600) -> Iterator[BinaryIO]:
+    """A stream into a file that is there all or not at all, beside others that write the same one.
 
     Args:
-        path: of the file; its folder is made where it is missing. content: of the file.
+        path: of the file; its folder is made where it is missing, and an older file replaced in one move.
+        rights: of the file.
 
     Raises:
         OSError: it cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.stem[:16]}-", suffix=".part", dir=path.parent)
+    draft = Path(name)
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-        Path(name).replace(path)
+            yield stream
+        draft.chmod(rights)
+        draft.replace(path)
     finally:
-        with suppress(FileNotFoundError):
-            Path(name).unlink()
+        draft.unlink(missing_ok=True)
 
 
 def _checked(content: bytes, kind: str, key: str) -> Any:

@@ -6,7 +6,7 @@ import hashlib
 import time
 from pathlib import Path
 
-from plant_models.disk_cache.entries import write_whole
+from plant_models.disk_cache.entries import whole_file
 
 SETTLED = 2.0
 """A file changed less than this ago [s] may change again without a trace in its time stamps."""
@@ -64,7 +64,8 @@ def seal(path: Path) -> None:
     Raises:
         OSError: the note cannot be written.
     """
-    write_whole(_seal_of(path), file_digest(path).encode())
+    with whole_file(_seal_of(path)) as stream:
+        stream.write(file_digest(path).encode())
 
 
 def is_sealed(path: Path) -> bool:

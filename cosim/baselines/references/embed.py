@@ -7,8 +7,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from dataclasses import replace
@@ -39,6 +37,7 @@ from cosim.components.loading import describe_fmu
 from cosim.errors import BaselineError, OutputError
 from cosim.ssp.elements_of_data import add_parameter, child, root_of, text_of
 from fmus.tables.plain_data import jsonable
+from plant_models.disk_cache.entries import whole_file
 
 STAMP = (1980, 1, 1, 0, 0, 0)
 """Of the files added: the earliest a zip file can hold, so that the same content gives the same bytes."""
@@ -167,13 +166,9 @@ def _rewrite(source: Path, target: Path, files: Mapping[str, bytes | Related]) -
     """The archive with more files in it; what it held keeps its bytes, order, dates and rights."""
     added = {path: content for path, content in files.items() if isinstance(content, bytes)}
     related = [content for content in files.values() if isinstance(content, Related)]
-    draft: Path | None = None
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{target.stem}-", suffix=".part", dir=target.parent)
-        draft = Path(name)
         with (
-            os.fdopen(handle, "wb") as stream,
+            whole_file(target, 0o644) as stream,
             zipfile.ZipFile(source) as former,
             zipfile.ZipFile(stream, "w") as archive,
         ):
@@ -187,10 +182,5 @@ def _rewrite(source: Path, target: Path, files: Mapping[str, bytes | Related]) -
                 fresh = zipfile.ZipInfo(path, STAMP)
                 fresh.compress_type, fresh.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
                 archive.writestr(fresh, added[path])
-        draft.chmod(0o644)
-        draft.replace(target)
     except OSError as error:
         raise OutputError(f"{target} could not be written: {error.strerror or error}.") from error
-    finally:
-        if draft is not None:
-            draft.unlink(missing_ok=True)
