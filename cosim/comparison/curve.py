@@ -12,8 +12,8 @@ from cosim.errors import ComparisonError
 _FEW_VALUES = 16  # a signal of so few whole numbers that mostly stands still is an indicator, a mode or a counter: held
 
 
-EQUAL_INSTANT = 1e-9
-"""Of the time: how far rounding, also that of a file, moves an instant."""
+BESIDE = 1e-3
+"""Of a step: what is so near to a row is not between two rows."""
 ROUNDING, NOISE = 1e-12, 1e-6
 """Shares of the size of a signal: what rounding alone does, and the least range that is taken for one."""
 
@@ -106,6 +106,7 @@ def is_held(values: np.ndarray) -> bool:
     Args:
         values: of the signal, shape (rows,).
     """
+    values = values[np.isfinite(values)]
     if len(values) < 3 or not np.array_equal(values, np.rint(values)):
         return False
     changes = np.flatnonzero(np.diff(values))

@@ -191,15 +191,24 @@ def compare_signal(task: Task) -> SignalComparison:
         findings=findings,
         curves=_curves(task, points, jumps, allowed) if task.curves else None,
         scale=allowed.scale,
-        remark="" if findings else _remark(task, points, allowed),
+        remark="" if findings else _without_numbers(task) or _remark(task, points, allowed),
     )
+
+
+def _without_numbers(task: Task) -> str:
+    """That there was nothing to compare, or that rows of the result between those of the reference hold no number."""
+    missing = len(task.result.time) - int(np.count_nonzero(task.result.finite))
+    if not task.reference.finite.any():
+        return f"{task.name}: no row holds a number, so nothing was compared."
+    if not missing or not task.reference.finite.all():
+        return ""
+    rows = f"{missing} of {len(task.result.time)} rows of the result"
+    return f"{task.name}: {rows} hold no number, all of them between two rows of the reference."
 
 
 def _remark(task: Task, points: Points, allowed: Allowed) -> str:
     """That the range is that of a few rows, and that the others differ by what counts for them."""
     values = task.reference.values[task.reference.finite]
-    if not len(values):
-        return ""
     low, high = (float(value) for value in np.quantile(values, [_FEW_ROWS, 1.0 - _FEW_ROWS], method="nearest"))
     usual = values[(values >= low) & (values <= high)]
     spread, share = float(np.std(usual)), high - low
@@ -252,6 +261,7 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
         rms_error=0.0 if numbers else float("nan"),
         curves=curves,
         scale=allowed.scale,
+        remark=_without_numbers(task),
     )
 
 

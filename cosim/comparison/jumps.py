@@ -6,11 +6,12 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from cosim.comparison.curve import EQUAL_INSTANT, Curve
+from cosim.comparison.curve import Curve
 
 NEIGHBOURS = 4  # steps on either side that a step is held against
 _FAR_LARGER = 10.0  # times the steepest of them; an exponential must fall to a tenth in one sample to look like a jump
 SMALLEST = 1e-6  # of the range: rounding is no jump
+EQUAL_INSTANT = 1e-9  # of the time: how far rounding, also that of a file, moves an instant
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.comparison.curve import EQUAL_INSTANT, Curve
-from cosim.comparison.jumps import Jumps, choose, find_jumps, shifts
+from cosim.comparison.curve import Curve
+from cosim.comparison.jumps import EQUAL_INSTANT, Jumps, choose, find_jumps, shifts
 from cosim.comparison.tube import band_of, held_band, project, widen_at_ends
 
 _ROUNDED_TIME = 1e-2  # of the allowed time: a baseline rounds times to less than that

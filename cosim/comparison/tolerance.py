@@ -18,7 +18,7 @@ class Tolerance:
 
     A value may differ by ``absolute + relative * range``, where range is largest minus smallest value of the reference,
     at least a millionth of its largest size, and that size where it is constant; of whole numbers that are held it is
-    one at most, unless the tolerance is stated for the signal itself. An instant may differ by
+    one at most, unless the tolerance is stated under its full name. An instant may differ by
     ``time + time_relative * length`` of the reference.
 
     Args:
@@ -119,14 +119,14 @@ class Tolerances:
         return next((stated for pattern, stated in self.by_signal.items() if fnmatchcase(name, pattern)), self.default)
 
     def value_for(self, name: str, reference: Curve) -> float:
-        """Allowed difference in value of a signal, in its unit: a share of the range where the signal has a tolerance
-        of its own, else of `Curve.share_scale`.
+        """Allowed difference in value of a signal, in its unit: a share of the range where a tolerance is stated under
+        its full name, else of `Curve.share_scale`.
 
         Args:
             name: name of the signal. reference: what it is held against.
         """
-        stated = self.for_signal(name)
-        return stated.value_for(reference.share_scale if stated is self.default else reference.scale)
+        scale = reference.scale if name in self.by_signal else reference.share_scale
+        return self.for_signal(name).value_for(scale)
 
     def ignores(self, name: str) -> bool:
         """Whether a signal is not compared.

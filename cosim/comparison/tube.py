@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.comparison.curve import EQUAL_INSTANT, Curve
+from cosim.comparison.curve import BESIDE, Curve
 
 
 @dataclass(frozen=True)
@@ -109,9 +109,8 @@ def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarra
 
 def _is_apart(curve: Curve, reach: float) -> bool:
     """Whether the last row is further than `reach` [s] from those before it."""
-    end = float(curve.time[-1])
-    before = np.searchsorted(curve.time, end)
-    return before == 0 or bool(end - curve.time[before - 1] > reach + EQUAL_INSTANT * (1.0 + abs(end)))
+    before = np.searchsorted(curve.time, curve.time[-1])
+    return before == 0 or bool(curve.time[-1] - curve.time[before - 1] > reach * (1.0 + BESIDE))
 
 
 def _band_before(curve: Curve, until: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray) -> _TubeBand:

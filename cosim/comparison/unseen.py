@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cosim.comparison.curve import EQUAL_INSTANT, Curve
+from cosim.comparison.curve import BESIDE, Curve
 from cosim.comparison.jumps import NEIGHBOURS
 from cosim.comparison.tube import band_of
 
@@ -27,7 +27,7 @@ def unseen(reference: Curve, result: Curve, tolerance: float) -> np.ndarray:
     after = np.clip(np.searchsorted(time, at, side="right"), 1, max(len(time) - 1, 1))
     if len(time) < 2:
         return np.zeros(len(at))
-    reach = tolerance + EQUAL_INSTANT * (1.0 + np.abs(at))
+    reach = tolerance + BESIDE * (time[after] - time[after - 1])
     inside = (at > time[after - 1] + reach) & (at < time[after] - reach)
     equal = np.diff(at) == 0.0  # jumps are matched, not held against lines
     inside &= (

@@ -26,8 +26,9 @@ def test_a_code_that_is_a_little_off_differs(codes: list[int], off: int, data: s
     assert not compared(one, two, DEFAULT).equal
     if values.any():  # of a signal that is zero throughout, nothing says how large rounding is
         assert compared(one, made(time, discrete=["code"], code=values + 1e-5), DEFAULT).equal
-    stated = Tolerances.of(by_signal={"code": {"absolute": 3.0}})
-    assert compare_results(one, two, stated).equal
+    some = bool(values.any())
+    for fits, stated in ((True, {"c*": {"absolute": 3.0}}), (some, {"code": 3.0}), (False, {"c*": 0.3})):
+        assert compare_results(one, two, Tolerances.of(by_signal=stated)).equal == fits
 
 
 def test_a_quantity_keeps_the_share_of_its_range() -> None:
@@ -71,3 +72,33 @@ def test_a_change_in_the_last_row_is_seen(rows: int, finer: int, lost: bool) -> 
     assert not compared(reference, result, DEFAULT).equal
     if lost and finer == 1:  # a change that is late by less than allowed comes after the end
         assert compared(reference, result, Tolerance(time=2.0)).equal
+
+
+@given(st.floats(-2e9, 2e9))
+def test_what_is_seen_does_not_depend_on_where_time_begins(start: float) -> None:
+    time = start + np.arange(101) * 0.1
+    last, pulse = np.zeros(101), np.zeros(101)
+    last[-1] = pulse[50] = 1.0
+    zero, discrete = np.zeros(101), ["y"]
+    assert not compared(made(time, discrete=discrete, y=last), made(time, discrete=discrete, y=zero), DEFAULT).equal
+    few = made(time[::20], discrete=discrete, y=zero[::20])
+    assert not compared(made(time, discrete=discrete, y=pulse), few, DEFAULT).equal
+
+
+def test_an_indicator_with_missing_values_is_whole_numbers_too() -> None:
+    time = np.arange(100.0)
+    code = np.where(time < 5.0, np.nan, np.where(time > 30.0, 12000.0, 100.0))
+    assert not compared(made(time, code=code), made(time, code=code + 1.0), DEFAULT).equal
+
+
+def test_rows_without_numbers_that_pass_are_noted() -> None:
+    time = np.arange(101.0)
+    none, sine = np.full(101, np.nan), np.sin(0.01 * time)
+    rest = np.where(np.arange(101) % 2, np.nan, sine)
+    for rows, known in ((1, []), (2, ["Compared at 51 instants, those of reference; result has 101."])):
+        found = compared(made(time[::rows], y=none[::rows], k=sine[::rows]), made(time, y=none, k=sine), DEFAULT)
+        assert found.equal
+        assert found.notes == ["y: no row holds a number, so nothing was compared.", *known]
+    found = compared(made(time[::2], y=sine[::2]), made(time, y=rest), DEFAULT)
+    words = "y: 50 of 101 rows of the result hold no number, all of them between two rows of the reference."
+    assert (found.equal, found.notes[0]) == (True, words)
