@@ -31,10 +31,10 @@ def load_stepper() -> ctypes.CDLL:
         CompilationError: the compiler refused the sources.
         OSError: the cache folder cannot be written, or the library not be loaded.
     """
-    return _loaded(stepper_library(find_compiler(), cache_folder()))
+    return _loaded(_stepper_library(find_compiler(), cache_folder()))
 
 
-def stepper_library(compiler: Compiler, folder: Path) -> Path:
+def _stepper_library(compiler: Compiler, folder: Path) -> Path:
     """Path of the library in a cache folder, built there where it is missing.
 
     Args:

@@ -47,7 +47,7 @@ def table_content(table: ScenarioTable, folder: Path) -> str:
         table: of the scenario, with all settings in it. folder: start of its relative paths.
     """
     tables = plain(table.model_dump(by_alias=True, exclude_unset=True))
-    moved = map_paths(tables, lambda path: file_content((folder / path).resolve()))
+    moved = map_paths(tables, lambda path: _file_content((folder / path).resolve()))
     modules = [module_digest(name) for name in sorted(set(_modules(table)))]
     return f"{json.dumps([jsonable(moved), modules], sort_keys=True)} {version_text()}"
 
@@ -68,7 +68,7 @@ def _module(name: str, targets: Iterable[str]) -> Iterator[str]:
     yield from (m for m in (t.partition(":")[0] for t in (*code, *targets)) if m.partition(".")[0] not in _OWN)
 
 
-def file_content(path: Path) -> str:
+def _file_content(path: Path) -> str:
     """Digest of a file, and of those that belong to it: the files of the user's that a Python file imports, the tables
     of results.
 
@@ -106,7 +106,7 @@ def _code(function: Any) -> Iterator[str]:
         yield repr(function)
     if named.__module__.partition(".")[0] not in _OWN:
         path = getattr(sys.modules.get(named.__module__), "__file__", None)
-        yield _THIS_PROCESS if path is None else file_content(Path(path).resolve())
+        yield _THIS_PROCESS if path is None else _file_content(Path(path).resolve())
 
 
 @cache

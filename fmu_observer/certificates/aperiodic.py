@@ -55,7 +55,7 @@ def certify_sampled_error(
     _require_comparable(vertices)
     horizon = _longest_searched(max_gap)
     constant_limit = first_unstable_gap(vertices, horizon)
-    found = common_decrease(vertices, max_gap, switching)
+    found = _common_decrease(vertices, max_gap, switching)
     holds = found.holds
     limit = aperiodic_limit(vertices, horizon, switching)
     return gap_finding(
@@ -100,7 +100,7 @@ def with_switching_noted(found: Finding, vertices: tuple[GapError, ...], what: s
     covered = "covered too"
     if _left_out(vertices[0], found.demand):
         covered = "not evaluated"
-    elif not common_decrease(vertices, found.demand, True).holds:
+    elif not _common_decrease(vertices, found.demand, True).holds:
         limit = aperiodic_limit(vertices, _longest_searched(found.demand), switching=True)
         covered = f"covered up to {limit:.4g} s only" if limit > 0.0 else "covered for no gap that was tried"
     return found.also(remark(f"{what} that change within a gap are {covered}"))
@@ -117,17 +117,17 @@ def aperiodic_limit(vertices: tuple[GapError, ...], horizon: float, switching: b
         vertices: error equations of the vertices.
     """
     bound = min(first_unstable_gap(vertices, horizon), horizon)
-    if bound == horizon and common_decrease(vertices, horizon, switching).holds:
+    if bound == horizon and _common_decrease(vertices, horizon, switching).holds:
         return inf
 
     def covered(longest: float) -> bool:
-        return common_decrease(vertices, longest, switching).holds
+        return _common_decrease(vertices, longest, switching).holds
 
     return bisected(covered, 0.0, bound, width=_LIMIT_TOLERANCE, least=_SMALLEST_LIMIT * bound)[0]
 
 
 @lru_cache(maxsize=256)
-def common_decrease(vertices: tuple[GapError, ...], longest: float, switching: bool) -> Decrease:
+def _common_decrease(vertices: tuple[GapError, ...], longest: float, switching: bool) -> Decrease:
     """Seek one P for all vertices and all gaps in (0, longest] on a coarse grid, and recompute on a fine one.
 
     Where the fine grid finds a gap that the candidate does not cover, that gap joins the coarse grid. What is switching

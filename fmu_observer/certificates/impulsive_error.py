@@ -157,10 +157,10 @@ class ImpulsiveError(GeneratorError):
 
     @cached_property
     def _echelon(self) -> tuple[np.ndarray, list[int]]:
-        return row_echelon(self.reset)
+        return _row_echelon(self.reset)
 
 
-def row_echelon(matrix: np.ndarray) -> tuple[np.ndarray, list[int]]:
+def _row_echelon(matrix: np.ndarray) -> tuple[np.ndarray, list[int]]:
     """Reduced row echelon form with its zero rows left out, and the columns of its pivots.
 
     Args:

@@ -70,7 +70,7 @@ def page(system: HybridSystem, description: ModelDescription, preset: str | None
         counts=[name for name in OUTCOME_VARIABLES if name in by_name],
         presets=_preset_rows(system),
         checked=_certificate_rows(system),
-        commands=rebuild_commands(system.name),
+        commands=_rebuild_commands(system.name),
         tool=_tool(),
         terms=model_terms(system),
     )
@@ -242,7 +242,7 @@ COMMANDS = {
 }
 
 
-def rebuild_commands(identifier: str) -> dict[str, str]:
+def _rebuild_commands(identifier: str) -> dict[str, str]:
     """One command for each system, to be given in ``sources/``.
 
     Args:
@@ -263,4 +263,4 @@ def _rebuild_text(description: ModelDescription) -> str:
     interface = description.coSimulation or description.modelExchange
     name, version = interface.modelIdentifier, str(description.fmiVersion)[0]
     template = environment("fmus.documentation").get_template("staticLinking.txt.j2")
-    return template.render(name=name, version=version, commands=rebuild_commands(name))
+    return template.render(name=name, version=version, commands=_rebuild_commands(name))

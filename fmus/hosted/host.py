@@ -56,7 +56,7 @@ class Host:
     """
 
     def __init__(self, recipe: Mapping[str, Any], resources: Path, instance_name: str) -> None:
-        check_package(recipe["package"])
+        _check_package(recipe["package"])
         self.block = make_hosted_block(recipe, resources, instance_name)
         self.block.instantiate()
         module = sys.modules[recipe["module"]]  # an earlier instance may have loaded it, from another copy of the FMU
@@ -88,7 +88,7 @@ def package_version() -> str:
     return installed_version("fmu-observer") or OWN_VERSION
 
 
-def check_package(built_with: str) -> None:
+def _check_package(built_with: str) -> None:
     """Refuse an older `fmu-observer` than the FMU was built with.
 
     Args:

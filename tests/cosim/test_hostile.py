@@ -20,7 +20,7 @@ from test_fmus.events import DEEDS, hostile_fmu
 
 from cosim import CosimError, Scenario, load_result
 from cosim.cli import main
-from cosim.compiled.library import stepper_library
+from cosim.compiled.library import _stepper_library
 from cosim.components.loading import FMI2Component
 from cosim.process import exit_guard, watch
 from cosim.process.interruption import STOPPING, ends_like_ctrl_c
@@ -423,9 +423,9 @@ def test_a_damaged_stepper_in_the_cache_is_built_again(tmp_path: Path, monkeypat
         return folder / name
 
     monkeypatch.setattr("fmus.toolchain.cached_library.compile_library", compiled)
-    path = stepper_library(find_compiler(), tmp_path)
-    assert stepper_library(find_compiler(), tmp_path) == path
+    path = _stepper_library(find_compiler(), tmp_path)
+    assert _stepper_library(find_compiler(), tmp_path) == path
     assert len(built) == 1
     path.write_bytes(path.read_bytes()[:5000])
-    assert len(stepper_library(find_compiler(), tmp_path).read_bytes()) == 9000
+    assert len(_stepper_library(find_compiler(), tmp_path).read_bytes()) == 9000
     assert len(built) == 2

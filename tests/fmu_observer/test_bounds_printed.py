@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmu_observer.certificates.printed_bounds.sampled_bounds import (
+    _longest_gap_1_52,
+    _longest_gap_3_32,
+    _longest_gap_3_67,
     gain_matrix,
     lipschitz_constant,
-    longest_gap_1_52,
-    longest_gap_3_32,
-    longest_gap_3_67,
     sampled_findings,
     smallest_theta_1_51,
     smallest_theta_3_31,
@@ -24,27 +24,27 @@ DIGITS = 5.1e-5  # [s], the measured bounds are given to four decimals, some cut
 
 @pytest.mark.parametrize(("theta", "gap"), [(1.0, 0.0853), (2.0, 0.0427), (4.0, 0.0214), (5.0, 0.0171), (8.0, 0.0107)])
 def test_the_bounds_of_chapter_3(theta: float, gap: float) -> None:
-    assert longest_gap_3_32(theta, BETA_50_KMH) == pytest.approx(gap, abs=DIGITS)
+    assert _longest_gap_3_32(theta, BETA_50_KMH) == pytest.approx(gap, abs=DIGITS)
     relative = BETA_50_KMH / theta  # (3.67) has theta + beta for one theta
-    assert longest_gap_3_67(theta, BETA_50_KMH) * (1.0 + relative) == pytest.approx(
-        longest_gap_3_32(theta, BETA_50_KMH)
+    assert _longest_gap_3_67(theta, BETA_50_KMH) * (1.0 + relative) == pytest.approx(
+        _longest_gap_3_32(theta, BETA_50_KMH)
     )
-    assert longest_gap_3_67(theta) == pytest.approx(longest_gap_3_32(theta, 0.0))
+    assert _longest_gap_3_67(theta) == pytest.approx(_longest_gap_3_32(theta, 0.0))
 
 
 @pytest.mark.parametrize(("theta", "gap"), [(1.0, 0.0271), (8.0, 0.0034)])
 def test_the_bound_of_chapter_1(theta: float, gap: float) -> None:
-    assert longest_gap_1_52(theta, BETA_50_KMH) == pytest.approx(gap, abs=DIGITS)
+    assert _longest_gap_1_52(theta, BETA_50_KMH) == pytest.approx(gap, abs=DIGITS)
 
 
 def test_the_smallest_gains() -> None:
     assert pytest.approx(0.022, abs=5e-4) == smallest_theta_1_51(BETA_50_MS)
     assert pytest.approx(0.042, abs=5e-4) == smallest_theta_3_31(BETA_50_KMH)
-    assert longest_gap_3_32(smallest_theta_3_31(BETA_50_KMH), BETA_50_KMH) == pytest.approx(0.0, abs=1e-9)
+    assert _longest_gap_3_32(smallest_theta_3_31(BETA_50_KMH), BETA_50_KMH) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_gap_of_the_thesis_is_47_times_its_own_bound() -> None:
-    assert 0.5 / longest_gap_3_32(8.0, BETA_50_KMH) == pytest.approx(47.0, abs=0.5)
+    assert 0.5 / _longest_gap_3_32(8.0, BETA_50_KMH) == pytest.approx(47.0, abs=0.5)
 
 
 def test_the_matrix_solves_its_equation() -> None:

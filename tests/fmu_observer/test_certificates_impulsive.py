@@ -11,7 +11,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 from fmu_observer.certificates.aperiodic import certify_sampled_error
 from fmu_observer.certificates.gap_findings import CONSTANT_GAP, DECREASE, GROWTH
-from fmu_observer.certificates.impulsive_error import ImpulsiveError, row_echelon
+from fmu_observer.certificates.impulsive_error import ImpulsiveError, _row_echelon
 from fmu_observer.certificates.riccati_error import RiccatiError
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.small_gain import independent_gap_limit
@@ -58,7 +58,7 @@ def test_the_reduced_transition_has_the_eigenvalues_of_the_whole_one(
 
 
 def test_the_echelon_keeps_components() -> None:
-    rows, pivots = row_echelon(np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [1.0, 0.0, 0.0]]))
+    rows, pivots = _row_echelon(np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [1.0, 0.0, 0.0]]))
     assert pivots == [0, 1]
     np.testing.assert_array_equal(rows, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from fmu_observer import OBSERVERS
-from fmu_observer.certificates.aperiodic import certify_sampled_error, common_decrease
+from fmu_observer.certificates.aperiodic import _common_decrease, certify_sampled_error
 from fmu_observer.certificates.gap_findings import DECREASE
 from fmu_observer.certificates.impulsive_error import ImpulsiveError
 from fmu_observer.certificates.riccati_error import RiccatiError
@@ -60,7 +60,7 @@ def test_no_changes_within_a_certified_gap_raise_the_lyapunov_function(
 ) -> None:
     vertices = pair(theta, slopes, factors)
     longest = 0.3 / theta
-    found = common_decrease(vertices, longest, switching=True)
+    found = _common_decrease(vertices, longest, switching=True)
     if found.P is None or not found.holds:
         return
     P, gap = found.P, share * longest

@@ -16,7 +16,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.linalg import solve_continuous_lyapunov
 
 from fmu_observer.block import make_block
-from fmu_observer.certificates.aperiodic import certify_sampled_error, common_decrease
+from fmu_observer.certificates.aperiodic import _common_decrease, certify_sampled_error
 from fmu_observer.certificates.decaying_innovation_error import DecayingError, decaying_error
 from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.certificates.gap_findings import CONSTANT_GAP
@@ -140,7 +140,7 @@ def test_slopes_that_change_within_a_gap_do_not_break_what_is_certified_for_them
     gain = np.array([[10.0], [25.0]])
     vertices = tuple(decaying_error(slope(s), gain, C, 10.0, 0.5, (0, 1)) for s in (-0.5, 0.5))
     longest = 0.3
-    found = common_decrease(vertices, longest, True)
+    found = _common_decrease(vertices, longest, True)
     assert found.margin > 0.0
     assert found.P is not None
     numbers = np.random.default_rng(3)

@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from fmu_observer.certificates.printed_bounds.network_bounds import NetworkBounds, exact_predictor_delay, largest_gain
+from fmu_observer.certificates.printed_bounds.network_bounds import NetworkBounds, _largest_gain, exact_predictor_delay
 from fmu_observer.formulas.delay.finite_time_predictor import at_age, integral_weights, weighted
 from fmu_observer.models.known_models import find_model
 from fmu_observer.observers.generic.delayed.delayed_state_observer import DelayedStateObserver
@@ -258,7 +258,7 @@ def test_a_gain_over_all_frequencies() -> None:
     """Of a resonance, ``1 / (2 d sqrt(1 - d^2))``."""
     d = 0.1
     A, B = np.array([[0.0, 1.0], [-1.0, -2.0 * d]]), np.array([[0.0], [1.0]])
-    assert largest_gain(A, B) >= 1.0 / (2.0 * d * np.sqrt(1.0 - d * d))
+    assert _largest_gain(A, B) >= 1.0 / (2.0 * d * np.sqrt(1.0 - d * d))
 
 
 def cycle_radius(generator: np.ndarray, C: np.ndarray, order: tuple[tuple[int, ...], ...], interval: float) -> float:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from own_condition import own_condition
 from scipy.linalg import expm
 
-from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, circle_distance, transition_lipschitz
+from fmu_observer.certificates.printed_bounds.discrete_bounds import _circle_distance, _transition_lipschitz, centre_of
 from fmu_observer.models.discrete_model import _zero_order_hold, transition
 from fmu_observer.models.exhibits.pendulum_model import linear_pendulum, pendulum
 from fmu_observer.models.known_models import find_model
@@ -87,7 +87,7 @@ def test_the_lipschitz_bound_of_the_transition_is_never_exceeded(seed: int, peri
     other, u = one + generator.normal(0.0, 10.0 ** generator.uniform(-3.0, 0.5), 2), generator.normal(size=1)
     change = transition(model, one, u, period) - transition(model, other, u, period)
     nonlinear = (change - expm(centre_of(model) * period) @ (one - other)) / powers(scale, 2)
-    bound = transition_lipschitz(model, period, scale) * np.linalg.norm((one - other) / powers(scale, 2))
+    bound = _transition_lipschitz(model, period, scale) * np.linalg.norm((one - other) / powers(scale, 2))
     assert np.linalg.norm(nonlinear) <= bound * (1.0 + 1e-3) + 1e-12  # the Runge-Kutta step is not the flow
 
 
@@ -102,8 +102,8 @@ def test_no_perturbation_below_the_distance_leaves_the_unit_circle() -> None:
 
 
 def test_the_distance_to_the_circle_by_hand() -> None:
-    assert circle_distance(np.diag([0.5, -0.2])) == pytest.approx(0.5, abs=1e-3)
-    assert circle_distance(np.array([[0.0, 1.0], [-0.81, 0.0]])) < 0.19  # poles at +-0.9i
+    assert _circle_distance(np.diag([0.5, -0.2])) == pytest.approx(0.5, abs=1e-3)
+    assert _circle_distance(np.array([[0.0, 1.0], [-0.81, 0.0]])) < 0.19  # poles at +-0.9i
 
 
 # -- Kalman -----------------------------------------------------------------------------------------------------------

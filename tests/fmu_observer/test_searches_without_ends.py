@@ -21,7 +21,7 @@ from fmu_observer.certificates.gap_error import first_unstable_gap
 from fmu_observer.certificates.lipschitz_condition import best_thau_bound
 from fmu_observer.certificates.printed_bounds.discrete_bounds import centre_of, discrete_bound
 from fmu_observer.certificates.printed_bounds.high_gain_theta import binomial_gain, lyapunov_size, theta_from_slopes
-from fmu_observer.certificates.printed_bounds.network_bounds import largest_gain
+from fmu_observer.certificates.printed_bounds.network_bounds import _largest_gain
 from fmu_observer.certificates.sampled_error import SampledError
 from fmu_observer.certificates.small_gain import independent_gap_limit
 from fmu_observer.design.pole_placement import observer_gain
@@ -51,7 +51,7 @@ def held(rate: float) -> SampledError:
 # name: (found in a unit of time in which all is `rate` times as fast, the power of `rate` that it goes with, how far it
 # is looked for)
 OF_TIME: dict[str, tuple[Callable[[float], float], int, float]] = {
-    "peak of a response": (lambda c: largest_gain(c * A, c * B), 0, inf),
+    "peak of a response": (lambda c: _largest_gain(c * A, c * B), 0, inf),
     "independent gaps": (lambda c: independent_gap_limit(c * A, c * B, c * B, np.zeros((2, 2))), -1, inf),
     "overshoot": (lambda c: overshoot(c * A, 0.5 * c), 0, inf),
     "first crossing": (lambda c: first_crossing(c * A, c * B[:, 0], 1.0, 0.1), -1, inf),

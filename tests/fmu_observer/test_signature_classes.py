@@ -16,7 +16,7 @@ from fmu_observer.detection import WheelSignature
 from fmu_observer.detection.wheel_signature import CODES, WHEEL_CLASSES, _record_class
 from fmu_observer.formulas.signatures.classification import PencilSpace, SeparationError, train_classifier
 from fmu_observer.formulas.signatures.clouds import Coordinate, extent, separation
-from fmu_observer.formulas.signatures.conditional_estimate import train_conditional, train_curve
+from fmu_observer.formulas.signatures.conditional_estimate import _train_curve, train_conditional
 from fmu_observer.formulas.signatures.dynamic_signature import dynamic_signature
 from fmu_observer.formulas.signatures.properties import PROPERTIES, branch_tips, printed_branches, printed_tip
 from fmu_observer.observers.generic.signature import SignatureTrack
@@ -92,7 +92,7 @@ def test_what_is_not_held_apart_is_reported():
 
 def test_a_value_between_classes_is_interpolated():
     frequencies = np.repeat([0.04, 0.06, 0.08, 0.1], 8)
-    curve, _ = train_curve(waves(list(frequencies), [1.0] * 32), list(frequencies), SPACE)
+    curve, _ = _train_curve(waves(list(frequencies), [1.0] * 32), list(frequencies), SPACE)
     between = waves([0.05, 0.07, 0.09] * 4, [1.0] * 12, 7)
     found = curve.locate(between).value
     # Between its neighbours, and nearer than the next class: the noise and the phase move a point by less.

@@ -21,7 +21,7 @@ from fmu_observer.block import make_block
 from fmu_observer.observers.train import TakagiSugenoCdo
 from fmus.cli import main
 from fmus.hosted import HostedExportError, build_hosted_fmu
-from fmus.hosted.host import OWN_VERSION, HostError, check_package, package_version
+from fmus.hosted.host import OWN_VERSION, HostError, _check_package, package_version
 from fmus.toolchain.compile import find_compiler, header_folder
 
 pytestmark = pytest.mark.compiler
@@ -152,9 +152,9 @@ def test_models_that_cannot_be_hosted_are_refused_with_advice(tmp_path: Path) ->
 def test_an_older_package_is_refused() -> None:
     project = tomllib.loads((PROJECT / "pyproject.toml").read_text())["project"]
     assert package_version() == OWN_VERSION == project["version"]
-    check_package("0.0.1")
+    _check_package("0.0.1")
     with pytest.raises(HostError, match=r"built with fmu-observer 999\.1\.0, here is"):
-        check_package("999.1.0")
+        _check_package("999.1.0")
 
 
 def test_the_command_line_builds_and_suggests_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,7 @@ import pytest
 from fmpy import extract, read_model_description
 
 from fmus import build_fmu, cached_fmu, recipe
-from fmus.documentation.page import rebuild_commands
+from fmus.documentation.page import _rebuild_commands
 from fmus.toolchain.compile import find_compiler
 
 pytestmark = pytest.mark.compiler
@@ -126,7 +126,7 @@ def test_the_sources_alone_give_a_library(version: int, tmp_path: Path) -> None:
     (library,) = (folder / "binaries").rglob("locomotive.*")
     library.unlink()
     system = {"linux": "Linux", "darwin": "macOS", "windows": "Windows"}[fmpy.system]
-    _, *rest = rebuild_commands("locomotive")[system].split()
+    _, *rest = _rebuild_commands("locomotive")[system].split()
     (folder / "sources").rename(tmp_path / "alone")
     run([*find_compiler().command, *rest], tmp_path / "alone")
     (tmp_path / "alone" / library.name).rename(library)

@@ -43,7 +43,7 @@ def centre_of(model: ObserverModel) -> np.ndarray:
     return np.asarray(model.A + (np.mean(model.slopes, axis=0) if model.slopes else 0.0))
 
 
-def circle_distance(closed: np.ndarray, points: int = _POINTS) -> float:
+def _circle_distance(closed: np.ndarray, points: int = _POINTS) -> float:
     """Lower bound of the smallest singular value of ``z I - closed`` over the unit circle.
 
     Singular values move by no more than z does, so half the distance of two grid points is taken off.
@@ -54,7 +54,7 @@ def circle_distance(closed: np.ndarray, points: int = _POINTS) -> float:
     return max(0.0, smallest - 2.0 * sin(0.25 * (angles[1] - angles[0])))
 
 
-def transition_lipschitz(model: ObserverModel, period: float, scale: float) -> float:
+def _transition_lipschitz(model: ObserverModel, period: float, scale: float) -> float:
     """Bound of the Lipschitz constant of ``transition(x) - exp(A_c T) x``, A_c the centre, in scaled coordinates.
 
     ``exp(mu T) (exp(rho T) - 1)`` by Gronwall's lemma, mu the logarithmic norm of A_c and rho the constant of ``phi``
@@ -85,14 +85,14 @@ def discrete_bound(model: ObserverModel, gain: np.ndarray, period: float) -> Dis
     closed = scipy.linalg.expm(centre_of(model) * period) - gain @ model.C
     radius = float(np.abs(np.linalg.eigvals(closed)).max())
     if radius >= 1.0:
-        return DiscreteBound(radius, 0.0, transition_lipschitz(model, period, 1.0), 1.0)
+        return DiscreteBound(radius, 0.0, _transition_lipschitz(model, period, 1.0), 1.0)
     if model.phi is None or model.lipschitz == 0.0:
-        return DiscreteBound(radius, circle_distance(closed), 0.0, 1.0)
+        return DiscreteBound(radius, _circle_distance(closed), 0.0, 1.0)
 
     def margin(scale: float) -> float:
-        return circle_distance(scaled(closed, scale), _FEW) / transition_lipschitz(model, period, scale)
+        return _circle_distance(scaled(closed, scale), _FEW) / _transition_lipschitz(model, period, scale)
 
     scale = best_scale(margin, closed, _SCALES)
     return DiscreteBound(
-        radius, circle_distance(scaled(closed, scale)), transition_lipschitz(model, period, scale), scale
+        radius, _circle_distance(scaled(closed, scale)), _transition_lipschitz(model, period, scale), scale
     )

@@ -98,14 +98,14 @@ def network_bounds(
     return NetworkBounds(
         lipschitz=max(float(np.linalg.norm(drift, 2)) for drift in drifts),
         decay=decay,
-        gain=largest_gain(closed, gain) if decay > 0.0 else inf,
+        gain=_largest_gain(closed, gain) if decay > 0.0 else inf,
         measured=float(np.linalg.norm(C, 2)),
         cycle=cycle,
         predictors=max(predictors, 1),
     )
 
 
-def largest_gain(A: np.ndarray, B: np.ndarray) -> float:
+def _largest_gain(A: np.ndarray, B: np.ndarray) -> float:
     """Largest norm of ``inv(jw I - A) B`` over all frequencies, found on a grid and refined.
 
     Args:

@@ -58,7 +58,7 @@ def smallest_theta_1_51(lipschitz: float, K: Sequence[float] = _SHAPE, mu: float
     return _bounds(1.0, lipschitz, K, mu).smallest_theta
 
 
-def longest_gap_1_52(theta: float, lipschitz: float, K: Sequence[float] = _SHAPE, mu: float = 1.0) -> float:
+def _longest_gap_1_52(theta: float, lipschitz: float, K: Sequence[float] = _SHAPE, mu: float = 1.0) -> float:
     """tau [s] with ``2 tau (L + theta) |K| lambda_max^1.5 / (mu lambda_min^0.5) = 1``: Bouchama 2024, (1.52).
 
     Args:
@@ -76,7 +76,7 @@ def smallest_theta_3_31(lipschitz: float) -> float:
     return sqrt(2.0 * lipschitz)
 
 
-def longest_gap_3_32(theta: float, lipschitz: float) -> float:
+def _longest_gap_3_32(theta: float, lipschitz: float) -> float:
     """``(theta - 2 beta/theta) / (2 sqrt(5) theta^2 sqrt(lambda_max/lambda_min))`` [s], Bouchama 2024, (3.32), (3.87).
 
     The eigenvalues are those of `gain_matrix`, and ``sqrt(5) = |K|`` of K = (2, 1). Negative below
@@ -88,7 +88,7 @@ def longest_gap_3_32(theta: float, lipschitz: float) -> float:
     return (theta - 2.0 * lipschitz / theta) / (2.0 * theta**2 * _gain_size())
 
 
-def longest_gap_3_67(theta: float, lipschitz: float = 0.0) -> float:
+def _longest_gap_3_67(theta: float, lipschitz: float = 0.0) -> float:
     """``(theta - 2 beta/theta) / (2 theta (theta + beta) |K| sqrt(lambda_max/lambda_min))`` [s], Bouchama 2024, (3.67).
 
     The bound of the wheel stage. Its beta is undefined in print; the equations give 0, for the stage has no nonlinear
@@ -120,9 +120,9 @@ def sampled_findings(theta: float, lipschitz: float = 0.0) -> tuple[Finding, ...
     vertices = tuple(SampledError.of([[0.0, 1.0], [0.0, -s]], gain, decay) for s in sorted({0.0, lipschitz}))
     exact = certify_sampled_error(vertices, 2.0 / theta, "double integrator with drag")
     printed = {
-        "(1.52)": longest_gap_1_52(theta, lipschitz),
-        "(3.32), (3.87)": longest_gap_3_32(theta, lipschitz),
-        "(3.67)": longest_gap_3_67(theta, lipschitz),
+        "(1.52)": _longest_gap_1_52(theta, lipschitz),
+        "(3.32), (3.87)": _longest_gap_3_32(theta, lipschitz),
+        "(3.67)": _longest_gap_3_67(theta, lipschitz),
     }
     bounds = (as_printed("gap", value, "", f"Bouchama 2024, {formula}") for formula, value in printed.items())
     return (*bounds, replace(exact, holds=None, demand=None), exact.condition(CONSTANT_GAP))

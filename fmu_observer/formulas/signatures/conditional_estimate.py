@@ -66,7 +66,7 @@ class _ClassCurve:
         return _Located(self.place_values[place], away[np.arange(len(place)), place])
 
 
-def train_curve(records: np.ndarray, values: Sequence[float], space: PencilSpace) -> tuple[_ClassCurve, float]:
+def _train_curve(records: np.ndarray, values: Sequence[float], space: PencilSpace) -> tuple[_ClassCurve, float]:
     """Curve of classes in the drawn plane in which it gives the experiments of the training back best [ours: the plane
     with the widest strips may have the classes out of order, and values between them are then lost].
 
@@ -169,12 +169,12 @@ def train_conditional(
         ValueError: the first quantity has fewer than two classes, or there is not one value a record.
     """
     records, other = np.asarray(records, dtype=float), np.asarray(second, dtype=float)
-    curve, margin = train_curve(records, first, space)
+    curve, margin = _train_curve(records, first, space)
     margins, stages = {"first": margin}, dict[float, _ClassCurve | float]()
     for value in curve.values:
         here = np.asarray(first) == value
         if len(np.unique(other[here])) < 2:
             stages[float(value)] = float(other[here][0])
             continue
-        stages[float(value)], margins[f"second at {value:g}"] = train_curve(records[:, here], list(other[here]), space)
+        stages[float(value)], margins[f"second at {value:g}"] = _train_curve(records[:, here], list(other[here]), space)
     return _ConditionalEstimator(curve, stages), margins

@@ -145,14 +145,14 @@ def test_a_block_in_the_plan_stays_with_python(tmp_path: Path) -> None:
 
 def test_the_library_is_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compiler = library.find_compiler()
-    path = library.stepper_library(compiler, tmp_path)
+    path = library._stepper_library(compiler, tmp_path)
     before = path.stat().st_mtime_ns
 
     def never(*_: Any) -> Any:
         raise AssertionError("compiled again")
 
     monkeypatch.setattr("fmus.toolchain.cached_library.compile_library", never)
-    assert library.stepper_library(compiler, tmp_path) == path
+    assert library._stepper_library(compiler, tmp_path) == path
     assert path.stat().st_mtime_ns == before
     assert sorted(p.name for p in path.parent.iterdir()) == [f"{path.stem}.sha256", path.name]
 

@@ -26,7 +26,7 @@ from cosim.runs import cluster
 from cosim.runs.engine import run_jobs
 from cosim.runs.executors import Executor, InThisProcess, make_executor
 from cosim.runs.journal import EARLIER, JOURNAL, Journal, read_lines
-from cosim.runs.keys import code_content, file_content
+from cosim.runs.keys import _file_content, code_content
 from cosim.runs.run import Run
 from cosim.runs.workers import Team
 from cosim.studies.sweep_result import SweepResult
@@ -154,7 +154,7 @@ def test_a_python_model_that_ends_its_process_or_hangs_is_a_row_where_calls_are_
 def test_a_key_is_of_contents_and_not_of_places(fmu: Path, tmp_path: Path) -> None:
     key = Run(three(fmu)).key
     moved = Path(shutil.copy(fmu, tmp_path / "other.fmu"))
-    assert file_content(moved) != file_content(fmu)  # its name may be part of what is read
+    assert _file_content(moved) != _file_content(fmu)  # its name may be part of what is read
     moved = Path(shutil.copy(fmu, tmp_path / fmu.name))
     assert Run(three(moved)).key == key
     others = [Run(three(moved), {"seed": 1}), Run(three(moved), {"bad.deed": 1.0}), Run(three(moved), rests_on="other")]
