@@ -281,7 +281,10 @@ def test_long_runs_open_with_their_extremes_and_are_whole_soon(tmp_path: Path) -
 def test_a_panel_without_a_number_and_names_without_a_blank_fit_everywhere(tmp_path: Path) -> None:
     """On a logarithmic axis, too; a name is never cut, and a large number on an axis is short."""
     long, nothing = f"component.{'signal_with_a_long_name_' * 4}", np.full(3, np.nan)
-    curves = [PageCurve(long, nothing, "m"), PageCurve("a.b", np.array([1.0, 2.0, 3.0]), "m")]
+    curves = [
+        PageCurve(long, nothing, "m"),
+        PageCurve("a.b", np.array([1.0, -2.34567e-5, 3.0]), "m/s2", label="largest speed of a long train in the rain"),
+    ]
     made = LivePage(
         "t",
         PageVerdict("v"),
@@ -293,12 +296,24 @@ def test_a_panel_without_a_number_and_names_without_a_blank_fit_everywhere(tmp_p
         cut = "[...document.querySelectorAll('.entry .name')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
         assert page.evaluate(cut) == 0
         assert page.evaluate(f"{EXPLORER}.axisName()") == "train.mass [kg]"
+        before = plot(page, 1)
+        page.evaluate(f"{EXPLORER}.point(1.1e6)")  # values in the legends do not move the plot away from the mouse
+        assert plot(page, 1) == before
         assert page.evaluate("[1e6, 1.25e6, 1.23456789e-7, 12].map((v) => shown(v, 7))") == [
             "1e6",
             "1.25e6",
             "1.23457e−7",
             "12",
         ]
+
+
+def test_a_browser_whose_system_has_no_language_draws(tmp_path: Path) -> None:
+    """As WebKit's under LANG=C, which calls its language C."""
+    with opened(explored_page(), tmp_path) as page:
+        page.add_init_script("Object.defineProperty(navigator, 'language', {value: 'C', configurable: true})")
+        page.reload()
+        page.wait_for_selector("#explorer[data-ready]")
+        assert page.locator("canvas").count() == 2
 
 
 def test_dark_and_light_are_drawn(tmp_path: Path) -> None:
