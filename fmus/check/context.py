@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -17,6 +17,7 @@ from fmus.check.checked_instance import FmuInstance, FmuSlave, make_slave
 from fmus.check.exchange_model import FmuModel, make_model
 from fmus.check.runner import Runner
 from fmus.fmi.standard import MODEL_EXCHANGE
+from fmus.fmi.surroundings import Surroundings
 
 SHARE_OF_BUDGET = 0.3
 """Of the time of a check, for finding inputs that move something."""
@@ -41,6 +42,7 @@ class Context:
         steps: of the longest run.
         ends: whether instances are terminated and freed. announce: called with the name of each call that ends one,
             and with nothing after it.
+        surroundings, directory: of the process, before anything of the FMU runs; `entries` are those of the directory.
     """
 
     folder: Path
@@ -52,6 +54,11 @@ class Context:
     steps: int
     ends: bool = True
     announce: Callable[[str], None] = lambda _what: None
+    surroundings: Surroundings = field(default_factory=Surroundings)
+    directory: Path = field(default_factory=Path.cwd)
+
+    def __post_init__(self) -> None:
+        self.entries = {entry.name for entry in self.directory.iterdir()}
 
     def slave(self, *, logging: bool = False) -> FmuSlave:
         """A fresh co-simulation instance, not yet instantiated. All have one name: what is drawn may follow from it.
@@ -79,6 +86,8 @@ class Context:
 
     def quiet_runner(self) -> Runner:
         """A runner that has not been stepped to find an excitation; the caller puts it away."""
+        if self.only_once and "runner" in self.__dict__:
+            self.runner.park()
         return Runner(
             self.slave, self.starts, self.start_time, self.step, until=self.start_time + self.steps * self.step
         )

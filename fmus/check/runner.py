@@ -135,11 +135,12 @@ class Runner(AbstractContextManager["Runner"]):
             self._best = moving, amplitude, spread
         return moving >= max(1, len(before) // 3)
 
-    def begin(self, *, excited: bool = True) -> np.ndarray:
+    def begin(self, *, excited: bool = True, meanwhile: Callable[[], None] = lambda: None) -> np.ndarray:
         """An instance at the start, by a reset where resets are known to work, and its outputs there, shape (q,).
 
         Args:
             excited: whether the inputs are set; else they keep their start values.
+            meanwhile: called at the end of initialisation.
         """
         if self._started and self.reset_works:
             self.component.reset()
@@ -151,6 +152,7 @@ class Runner(AbstractContextManager["Runner"]):
         self.component.enter_initialization(self.t0, self.end)
         if excited:
             self.set_inputs(self.amplitude)
+        meanwhile()
         self.component.exit_initialization()
         return self.outputs()
 
@@ -184,6 +186,17 @@ class Runner(AbstractContextManager["Runner"]):
             if self.component.terminated:
                 raise self.component.failure("asked to terminate under the probe", self.now)
         return rows
+
+    def steps_at_most(self, count: int) -> int:
+        """Steps of the usual length from where the instance stands, as many as it does before it asks for the end.
+
+        Args:
+            count: the most to make.
+        """
+        done = 0
+        while done < count and not self.component.terminated:
+            done += len(self.step(self.h))
+        return done
 
     def step(self, h: float) -> list[np.ndarray]:
         """One step of length `h` [s]: the outputs after it in a list, which is empty where the FMU asks for the end."""

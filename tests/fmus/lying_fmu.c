@@ -15,6 +15,7 @@ enum { FORCE = 1, POSITION = 2, SPEED = 3, RATE = 4, PULSE_TIME = 5, PULSE_COUNT
 
 typedef struct {
     double value[NUMBER]; /* by value reference; 0 is not used */
+    double late;         /* LIE_INPUT_LATE: the force of the step before */
     double hidden[2];    /* forces on their way: each acts a step later */
     double time;
     double pulses; /* counted events that have happened: each adds one to the speed */
@@ -34,6 +35,9 @@ static double shared; /* LIE_SHARED: the steps of all instances since one of the
 static void begin(Instance *instance) {
     memset(&instance->data, 0, sizeof instance->data);
     instance->data.value[SPEED] = 1.0;
+#ifdef LIE_OTHER_START
+    instance->data.value[SPEED] = 2.0;
+#endif
     instance->own_time = shared = 0.0;
 #ifdef LIE_NAN_AT_START
     instance->data.value[POSITION] = NAN;
@@ -48,6 +52,11 @@ static void flow(Instance *instance, double h) {
     double force = d->value[FORCE];
 #ifdef LIE_SHARED
     force += 1e-3 * shared++;
+#endif
+#ifdef LIE_INPUT_LATE
+    const double now = force;
+    force = d->late;
+    d->late = now;
 #endif
 #if defined LIE_HALF_RESTORED
     double held = d->hidden[0];
@@ -275,6 +284,25 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
 #ifdef LIE_ENDS
     if (t + h > 0.305)
         return fmi2Discard;
+#endif
+#ifdef LIE_OPENS_FILES
+    if (fopen("/dev/null", "r") == NULL)
+        return fmi2Error;
+#endif
+#ifdef LIE_WRITES_FILE
+    FILE *file = fopen("own.log", "a");
+    fprintf(file, "%g\n", t);
+    fclose(file);
+#endif
+#ifdef LIE_MOVES
+    if (chdir("/") != 0)
+        return fmi2Error;
+#endif
+#ifdef LIE_FIRST_STEP_LOST
+    if (instance->data.time < 1e-9) {
+        instance->data.time = t + h;
+        return fmi2OK;
+    }
 #endif
 #ifdef LIE_CRASH_IN_STEP
     *(volatile int *)(size_t)8 = 1;

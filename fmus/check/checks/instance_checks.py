@@ -34,8 +34,8 @@ def _resident_bytes() -> int | None:
     return None
 
 
-def _open_files() -> int | None:
-    """Open file descriptors of this process, or None where that is not known."""
+def open_files() -> int | None:
+    """How many files are open in this process, or None where that is not known."""
     if sys.platform == "win32":
         return None
     with suppress(OSError):
@@ -107,9 +107,9 @@ class RepeatedInstantiationCheck(
                 slave.exit_initialization()
                 slave.free_instance_only()
                 if count in (_FIRST_INSTANCES, _INSTANCES):
-                    marks.append((count, _resident_bytes(), _open_files()))
+                    marks.append((count, _resident_bytes(), open_files()))
                 elif perf_counter() - since > SHARE_OF_BUDGET * context.budget and count > _FIRST_INSTANCES:
-                    marks.append((count, _resident_bytes(), _open_files()))
+                    marks.append((count, _resident_bytes(), open_files()))
                     break
         finally:
             slave.free()

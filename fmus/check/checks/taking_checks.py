@@ -87,7 +87,7 @@ class WarningsCheck(Check, failing=NOTE, place=6.4):
     @staticmethod
     def run(context: Context) -> CheckOutcome:
         with context.begun_runner() as runner:
-            steps = sum(len(runner.step(runner.h)) for _ in range(min(SLOW_STEPS, context.steps)))
+            steps = runner.steps_at_most(min(SLOW_STEPS, context.steps))
             warnings = runner.component.call_warnings
         if warnings:
             return noted(f"calls returned the status warning in a run of {steps} steps: {warnings}")
