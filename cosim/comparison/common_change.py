@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from cosim.comparison.span import with_unit
-from cosim.comparison.verdict import ComparisonData, Curves, SignalComparison
+from cosim.comparison.verdict import SPAN, ComparisonData, Curves, SignalComparison
 
 Kind = Literal["factor", "delay", "offset"]
 KINDS: tuple[Kind, ...] = ("factor", "delay", "offset")
@@ -68,7 +68,7 @@ def common_changes(comparison: ComparisonData) -> list[CommonChange]:
     Args:
         comparison: made with its curves.
     """
-    fits = {s.name: _fits(s) for s in comparison.failed if s.status == "differs" and s.curves is not None}
+    fits = {s.name: _fits(s) for s in comparison.failed if any(f.kind not in SPAN for f in s.findings)}
     found = []
     while shared := _largest_group(fits):
         fit, names = shared

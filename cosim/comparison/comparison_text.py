@@ -9,7 +9,7 @@ from math import isnan, nan
 from typing import Any
 
 from cosim.comparison.common_change import common_changes
-from cosim.comparison.verdict import ComparisonData, ComparisonFinding, EventComparison, SignalComparison
+from cosim.comparison.verdict import SPAN, ComparisonData, ComparisonFinding, EventComparison, SignalComparison
 from fmus.tables.numbers import DASH
 from fmus.tables.table import Column, Parts, Table, joined, name_column, text_column
 
@@ -43,7 +43,6 @@ _POINT_COLUMNS = (
     Column("result", "result", write="{:.8g}".format),
     Column("error", "error", write="{:+.4g}".format),
 )
-SPAN = ("starts_early", "starts_late", "ends_early", "ends_late", "gap")
 MOST_LINES = 32
 """Of a comparison where not all is asked for: pytest adds the baseline and where the pages are, and 40 fit a screen."""
 _FIRST_CAUSES, _CHANGES, _ROWS, _NOTES = 3, 3, 6, 4

@@ -129,10 +129,9 @@ def unseen_findings(
         worst = a + int(np.argmax(off[a:b]))
         begin, end, at = (float(reference.time[row]) for row in (a, b - 1, worst))
         size, limit = (with_unit(value, unit) for value in (float(off[worst]), allowed.value))
-        text = (
-            f"{name}: {when(begin, end)} the reference moves between two rows of the result, at worst by "
-            f"{size} at {at:.9g} s (allowed {limit}); too few rows to be compared"
-        )
+        amount = f"by {size}" if begin == end else f"at worst by {size} at {at:.9g} s"
+        what = f"the reference moves between two rows of the result, {amount} (allowed {limit})"
+        text = f"{name}: {when(begin, end)} {what}; too few rows to be compared"
         found.append(ComparisonFinding("gap", begin, end, np.nan, np.nan, float(off[worst]), allowed.value, text, at))
     return found
 

@@ -12,16 +12,15 @@ from cosim.comparison.tube import band_of
 def unseen(reference: Curve, result: Curve, tolerance: float) -> np.ndarray:
     """How far each row of the reference is from all that the rows of the result around it say.
 
-    Between two rows a held signal is expected between their values. Any other is expected on the straight line between
-    them, but for as much as the result bends nearby: the largest change of its slope, times the step, which is four
-    times what is between rows of a smooth curve and bounds what a kink or a jump between two rows is.
+    Between two rows a held signal is expected between their values; any other on the straight line between them, but
+    for as much as the result bends nearby: the largest change of its slope times the step. That is four times what a
+    smooth curve does between rows, and bounds a kink or a jump there.
 
     Args:
         reference: with more rows. result: with fewer. tolerance: allowed shift [s].
 
     Returns:
-        Distances [unit], zero at the rows of the result and where one side has no number, shape (rows of the
-        reference,).
+        Distances [unit], zero at rows of the result and where one side has no number, shape (rows of the reference,).
     """
     time, at = result.time, reference.time
     after = np.clip(np.searchsorted(time, at, side="right"), 1, max(len(time) - 1, 1))
@@ -43,8 +42,8 @@ def unseen(reference: Curve, result: Curve, tolerance: float) -> np.ndarray:
     else:
         band, bend = band_of(result, at, tolerance), _bends(result)[after - 1]
         low, high = band.low - bend, band.high + bend
-    values = reference.filled
-    return np.where(inside, np.maximum(0.0, np.maximum(values - high, low - values)), 0.0)
+    off = np.maximum(reference.filled - high, low - reference.filled)
+    return np.where(inside, np.maximum(0.0, off), 0.0)
 
 
 def _bends(curve: Curve) -> np.ndarray:

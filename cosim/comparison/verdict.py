@@ -26,6 +26,8 @@ Kind = Literal[
     "gap",  # no rows where the reference has many
     "unit",  # units that cannot be converted into each other
 ]
+SPAN = ("starts_early", "starts_late", "ends_early", "ends_late", "gap")
+"""Kinds that concern the rows, and no value that was compared."""
 Status = Literal["equal", "within", "differs", "missing", "extra", "ignored"]
 """``equal``: every bit; ``within`` the tolerance; ``missing``: only the reference has the signal; ``extra``: only the
 result.

@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_results import compared, kinds, made
 
+from cosim.comparison.common_change import common_changes
+from cosim.comparison.comparison_text import comparison_text
 from cosim.comparison.tolerance import Tolerance
 
 DEFAULT = Tolerance()
@@ -62,3 +64,11 @@ def test_of_two_rows_it_is_said_that_they_are_too_few() -> None:
         f"{one.worst:.9g} s (allowed 0.005599 m); too few rows to be compared"
     )
     assert one.size == pytest.approx(50.0)
+
+
+def test_what_is_not_seen_is_no_change_of_the_values() -> None:
+    spike = np.where(np.arange(601) == 301, 7.5, 0.0)
+    found = compared(made(TIME, y=spike), made(TIME[::2], y=spike[::2]), DEFAULT)
+    assert kinds(found["y"]) == ["gap"]
+    assert common_changes(found) == []
+    assert "y: at 3.01 s the reference moves between two rows of the result, by 7.5 (allowed" in comparison_text(found)
