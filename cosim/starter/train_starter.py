@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Set
+from math import inf
 from typing import Any
 
 from cosim.run.component_models import make_declared
@@ -20,6 +21,7 @@ DEFAULT_OBSERVER, WITHOUT_EFFORT, DENSE = "quasi_lpv_uio", "odometer_reset", "di
 """What a stranger gets beside an effort, and without one; and what is far better with a balise every half second at all
 times, which no FMU says and no train has that starts from standstill, so it is named only."""
 HORIZON, STEP, SHORTEST, LONGEST = 60.0, 0.01, 1e-3, 0.5
+JOURNEY = 10.0  # [s]: what an FMU names below it is a default of its tool
 RADIUS, PERIOD = 0.5, 0.01
 PRESETS = {"takagi_sugeno_cdo": "long_gaps"}
 """What is offered beside balises laid by distance, whose gaps nobody knows beforehand: gains that no gap makes
@@ -61,13 +63,16 @@ def train(inspected: InspectedFmu, roles: PlantRoles, observer: str, place: str)
         Values by name.
     """
     stop, step, source = train_times(inspected)
+    start, stop, span = (0.0, stop, "") if roles.effort else _own_span(inspected, stop, step)
     declared = declared_observer(observer)
     known = {signal.name for signal in (*declared.parameter_signals, *getattr(declared, "states", ()))}
     driven = roles.effort.signal.name if roles.effort else None
     needed = {"position": roles.position, "speed": roles.speed}
     return {
         "title": f"{one_line(inspected.path.name)} beside one observer",
+        "start": start,
         "stop": stop,
+        "span": span,
         "step": step,
         "source": source,
         "links": _links(roles, {signal.name for signal in declared.inputs}),
@@ -142,6 +147,16 @@ def train_times(inspected: InspectedFmu) -> tuple[float, float, str]:
                 continue
             return stop, length, source
     return HORIZON, STEP, "communication step"
+
+
+def _own_span(inspected: InspectedFmu, stop: float, step: float) -> tuple[float, float, str]:
+    """Start and stop [s] of the journey that is in an FMU without an input to drive it, and where they come from."""
+    advised = inspected.description.defaultExperiment
+    begin, end = (number(advised.startTime) or 0.0, number(advised.stopTime)) if advised else (0.0, None)
+    if end is None or not JOURNEY <= end - begin < inf:
+        return 0.0, stop, ""
+    end = round(begin + round((end - begin) / step) * step, 9)
+    return begin, end, "from the FMU's default experiment"
 
 
 # -- connections ------------------------------------------------------------------------------------------------------

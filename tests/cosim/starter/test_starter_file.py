@@ -246,6 +246,26 @@ def test_the_step_is_the_fmus_own(tmp_path: Path) -> None:
     assert table.stop == pytest.approx(60.0, abs=0.07)
 
 
+@pytest.mark.parametrize(
+    ("advised", "expected"),
+    [
+        ('startTime="1000.0" stopTime="1120.0" stepSize="0.05"', (1000.0, 1120.0, 0.05)),
+        ('startTime="0.0" stopTime="3605.0"', (0.0, 3605.0, 0.01)),
+        ('startTime="0.0" stopTime="1.0"', (0.0, 60.0, 0.01)),
+        ('startTime="0.0" stopTime="INF"', (0.0, 60.0, 0.01)),
+    ],
+)
+def test_a_train_that_nobody_drives_runs_as_long_as_its_fmu_says(
+    advised: str, expected: tuple[float, float, float], tmp_path: Path
+) -> None:
+    """What drives it is in it, and may come late; a second is the default of a tool, and no journey."""
+    parts = (out("position", 1, "m"), out("speed", 2, "m/s"))
+    fmu = described(tmp_path, *parts, edit=('startTime="0.0" stopTime="1.0"', advised))
+    write_starter(fmu, tmp_path / "mine.toml")
+    table = valid(tmp_path / "mine.toml").table()
+    assert (table.start, table.stop, table.step) == pytest.approx(expected)
+
+
 def test_an_fmu_that_names_no_end_runs_for_ten_seconds(tmp_path: Path) -> None:
     made = write_starter(described(tmp_path, out("level", 1), edit=(' stopTime="1.0"', "")), tmp_path / "mine.toml")
     assert (made.kind, "names no end of a run" in made.text) == ("alone", True)
