@@ -93,9 +93,13 @@ def _preset(table: ComponentTable) -> str | None:
 
 def _distinct(candidates: Sequence[BenchmarkCandidate]) -> list[BenchmarkCandidate]:
     """Candidates of which no two have one name: two instances of a class, say."""
-    names = [candidate.name for candidate in candidates]
-    earlier = [names[:place].count(name) for place, name in enumerate(names)]
-    return [replace(c, name=f"{c.name}_{n + 1}") if n else c for c, n in zip(candidates, earlier, strict=True)]
+    names, labels = [c.name for c in candidates], [c.table.label for c in candidates]
+    found = []
+    for place, one in enumerate(candidates):
+        name, label = names[:place].count(one.name), labels[:place].count(one.table.label)
+        table = one.table.model_copy(update={"label": f"{one.table.label} ({label + 1})"}) if label else one.table
+        found.append(replace(one, name=f"{one.name}_{name + 1}" if name else one.name, table=table))
+    return found
 
 
 def _named(scenario: Scenario, parts: ScenarioParts, stated: Any, known: Known) -> BenchmarkCandidate:

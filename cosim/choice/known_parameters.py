@@ -16,12 +16,14 @@ from cosim.evaluation.roles import recorded
 from cosim.results.result import Result
 from cosim.run.component_models import make_declared, make_system, values_in_use
 from cosim.run.connections import recorded_link, transformation
+from cosim.run.plausible_masses import HEAVIEST, LIGHTEST
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from cosim.starter.guessed_signal import in_si
 from cosim.starter.inspected_fmu import inspect_fmu
 from cosim.starter.starter_roles import plant_roles
 from cosim.starter.train_starter import DAVIS, usual_resistance
+from fmus.tables.numbers import number
 from plant_models.hybrid import Signal
 
 Known = Mapping[str, tuple[float, str]]
@@ -93,6 +95,21 @@ def derived_parameters(known: Known, parts: ScenarioParts, run: Result) -> dict[
         by_mass = {name: (value, "usual for this mass") for name, value in usual_resistance(found[MASS][0]).items()}
         found = by_mass | found
     return found
+
+
+def implausible_mass(known: Known) -> list[str]:
+    """That the mass which observers are to believe in is no train's, in words; nothing where it is, or nobody knows it.
+
+    Args:
+        known: from `derived_parameters`.
+    """
+    value, source = known.get(MASS, (LIGHTEST, ""))
+    if LIGHTEST <= value <= HEAVIEST:
+        return []
+    return [
+        f"mass = {number(value)} kg ({source}) is that of no train, and observers are measured with it: those that "
+        "need one will look bad. State it [kg] as a parameter of an observer in the scenario (see cosim new)."
+    ]
 
 
 # -- what the scenario says -------------------------------------------------------------------------------------------

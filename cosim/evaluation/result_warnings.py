@@ -11,6 +11,7 @@ import numpy as np
 
 from cosim.evaluation.consistency import consistency_warnings
 from cosim.evaluation.metrics import FEWEST_INSTANTS, evaluated_size, instants, within
+from cosim.evaluation.plausible_speeds import speed_warnings
 from cosim.evaluation.roles import estimation_error, label, phases, recorded
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.evaluation.summary_entries import list_entry
@@ -29,8 +30,9 @@ def result_warnings(result: Result, spec: ReportSpec) -> list[str]:
 
     Returns:
         A text for each of: filters whose covariance does not fit their errors; where the true speed is known, a train
-        that never moves, phases that were not reached or hold too few rows, phases in which the train stands to the end
-        of the run, observers whose speed error is larger than the speed of the train.
+        that never moves, a position or an odometer that does not go with it, phases that were not reached or hold too
+        few rows, phases in which the train stands to the end of the run, observers whose speed error is larger than the
+        speed of the train.
     """
     filters = [] if result.failure is not None else list(consistency_warnings(result, spec))
     return _of_the_journey(result, spec) + filters
@@ -41,7 +43,7 @@ def _of_the_journey(result: Result, spec: ReportSpec) -> list[str]:
     if speed is None or not len(result.time):
         return []
     moving = np.flatnonzero(~(np.abs(speed) <= _STANDSTILL))
-    found = list(_standing(result, spec, moving))
+    found = [*_standing(result, spec, moving), *speed_warnings(result, spec)]
     if result.failure is None and spec.observers:
         found += _empty_phases(result, spec)
         found += _after_the_journey(result, spec, moving)

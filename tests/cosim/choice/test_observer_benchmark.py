@@ -82,6 +82,7 @@ def test_an_instance_takes_part_as_it_is() -> None:
     found = benchmark_observers(two(), [given, Constant])
     assert found.failed == []
     assert [outcome[f"{name}.speed"][-1] for name, outcome in found.outcomes.items()] == [3.5, 0.0]
+    assert len({score.label for score in found.scores}) == 2
 
 
 # -- the numbers of the run
@@ -241,6 +242,16 @@ def test_what_the_plant_is_by_default_is_known_too() -> None:
     assert found["davis_a"] == (starts["davis_a"], "as for locomotive")
     assert found["wheel_radius"] == (starts["wheel_radius"], "as for locomotive")
     assert found["odometer_period"] == (0.01, "of the odometer")
+
+
+@pytest.mark.parametrize(("mass", "named"), [(90.0, True), (90e3, False)])
+def test_a_mass_that_is_no_trains_is_named_before_observers_are_measured_with_it(mass: float, named: bool) -> None:
+    warned: list[str] = []
+    scenario = two().set("locomotive.mass", mass)
+    for name in find_parts(scenario).observers:
+        scenario.set(f"{name}.mass", mass)
+    benchmark_observers(scenario, ["odometer_reset"], warn=warned.append)
+    assert any(text.startswith("mass = 90.0 kg (as for") for text in warned) is named
 
 
 def test_an_observer_that_does_not_want_a_fact_does_not_hide_it() -> None:

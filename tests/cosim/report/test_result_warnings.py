@@ -36,7 +36,7 @@ def run(speed: Any, estimate: Any, step: float = 0.1, **more: Any) -> Result:
     count = len(speed)
     columns = {
         "train.speed": speed,
-        "train.position": np.zeros(count),
+        "train.position": np.concatenate(([0.0], np.cumsum(step * 0.5 * (np.add(speed[1:], speed[:-1]))))),
         "obs.speed": estimate,
         "obs.position": np.zeros(count),
     }
