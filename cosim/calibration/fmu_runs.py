@@ -80,7 +80,8 @@ class FmuRuns(JobRuns):
 
     def named_unit(self, name: str) -> NamedUnit | None:
         """What the unit of a signal is, by the definitions of the FMU; see `Runs.named_unit`."""
-        return self._signals.units[name]
+        unit: NamedUnit | None = self._signals.units[name]
+        return unit
 
     def job(self, values: Mapping[str, float], recorded: RecordedSignals) -> FmuRun:
         """A run of the FMU, see `JobRuns.job`."""

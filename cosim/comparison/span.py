@@ -59,7 +59,11 @@ def when(begin: float, end: float) -> str:
 
 
 def span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[ComparisonFinding]:
-    """Starts and ends that are further apart than the allowed time [s]."""
+    """Starts and ends that are further apart than a time allows.
+
+    Args:
+        name: of the signal. reference, result: its curves. allowed: time [s].
+    """
     found = []
     ends: tuple[tuple[float, float, Kind, Kind, str], ...] = (
         (float(reference.time[0]), float(result.time[0]), "starts_early", "starts_late", "starts"),

@@ -28,6 +28,14 @@ INSTANCE = "checked"
 """Name of all instances, one after the other and beside each other."""
 
 
+def _unnoted(call: str) -> None:
+    """Nothing is made of the name of a call.
+
+    Args:
+        call: that ends an instance.
+    """
+
+
 @dataclass
 class Context:
     """What is checked and how.
@@ -53,7 +61,7 @@ class Context:
     budget: float
     steps: int
     ends: bool = True
-    announce: Callable[[str], None] = lambda _what: None
+    announce: Callable[[str], None] = _unnoted
     surroundings: Surroundings = field(default_factory=Surroundings)
     directory: Path = field(default_factory=Path.cwd)
 

@@ -39,7 +39,7 @@ class _Aspect(NamedTuple):
 
     name: str
     read: Callable[[], Any]
-    put_back: Callable[[Any], None]
+    put_back: Callable[[Any], object]
 
 
 class Surroundings:
