@@ -63,6 +63,22 @@ class HermiteStep:
         """Whether the train moves one way at the start and the other way at the end."""
         return self.v0 * self.v1 < 0.0
 
+    def may_stand(self, acceleration: float) -> bool:
+        """Whether a train that accelerates or brakes no harder than this [m/s2] can stand or turn within the step."""
+        return abs(self.v0 + self.v1) <= acceleration * self.h
+
+    def reach(self, acceleration: float) -> tuple[float, float]:
+        """Lowest and highest position [m] within the step of a train that accelerates or brakes no harder than this
+        [m/s2]: it is between the parabolas of the hardest motion from the one end and to the other.
+        """
+        places = [self.p0, self.p1]
+        for a in (-acceleration, acceleration):
+            closing = self.v0 - self.v1 + a * self.h  # of both parabolas [m/s]
+            meet = (self.p1 - self.p0 - self.h * (self.v1 - 0.5 * a * self.h)) / closing if closing else 0.0
+            meet = min(max(meet, 0.0), self.h)
+            places.append(self.p0 + meet * (self.v0 + 0.5 * a * meet))
+        return min(places), max(places)
+
     def segments(self) -> list[Segment]:
         """The step, divided where the train turns."""
         if not self.turns():
@@ -82,7 +98,8 @@ class HermiteStep:
             if middle in (low, high):
                 break
             x = middle / h
-            if (p0 + x * (linear + x * (square + x * cubic)) >= target) == rising:
+            ahead = p0 + x * (linear + x * (square + x * cubic)) - target
+            if ahead >= 0.0 if rising else ahead <= 0.0:
                 high = middle
             else:
                 low = middle

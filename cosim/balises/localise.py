@@ -55,6 +55,8 @@ class _InterpolateLocaliser(Localiser):
         begin, start = watch.motion, watch.outputs.copy()
         watch.step(t, until)
         step = HermiteStep(until - t, *begin, *watch.motion)
+        if self.hides(step):
+            self.hidden_from = min(self.hidden_from, t)
         spread = self._spread(step)
         if isinstance(self.layout, TrackLayout):
             return self.crossings_between(step, t, start, step.time_bound(spread))

@@ -6,6 +6,7 @@ It may cut or redo the step; how, is up to the methods in the modules beside thi
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -25,6 +26,9 @@ ACCELERATION_LIMIT = 5.0
 bound.
 """
 
+SHORTEST_PART = 0.1
+"""Steps up to this length are taken as they are [s]: a train that turns twice within one gets 3 mm far at the limit."""
+
 
 class Localiser(Restorable, ABC):
     """Steps the watched plant and finds the crossings on the way.
@@ -38,6 +42,8 @@ class Localiser(Restorable, ABC):
 
     def __init__(self, watch: PlantMonitor, layout: TrackLayout | InstantLayout) -> None:
         self.watch, self.layout = watch, layout
+        self.hidden_from = inf
+        """Begin of the first step within which a balise may have been passed there and back without a word [s]."""
 
     @abstractmethod
     def step(self, t: float, until: float) -> list[tuple[Crossing, np.ndarray]]:
@@ -46,6 +52,14 @@ class Localiser(Restorable, ABC):
         Returns:
             The crossings in ``(t, until]`` in order of time, each with the plant's outputs at that instant, shape (q,).
         """
+
+    def hides(self, step: HermiteStep) -> bool:
+        """Whether a train may have passed a balise and come back within a step, of which only both ends are known."""
+        if step.h <= SHORTEST_PART or isinstance(self.layout, InstantLayout):
+            return False
+        if not step.may_stand(ACCELERATION_LIMIT):
+            return False
+        return bool(self.layout.crossed(*step.reach(ACCELERATION_LIMIT)))
 
     def crossings_between(
         self, step: HermiteStep, t: float, start: np.ndarray, bound: float

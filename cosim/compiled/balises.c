@@ -5,6 +5,7 @@
 
 #define ROOT_TOLERANCE 1e-11 /* [s], as in Python */
 #define MAX_ROOT_STEPS 60
+#define SHORTEST_PART 0.1 /* [s] */
 #define MAX_HALVINGS 200
 #define ROWS_AT_MOST 3 /* before and after the telegram, and the communication point */
 
@@ -117,7 +118,8 @@ static double guess_crossing(const Over *over, double target, bool rising) {
         double middle = 0.5 * (low + high);
         if (middle == low || middle == high)
             break;
-        if ((cubic_position(over, middle) >= target) == rising)
+        double ahead = cubic_position(over, middle) - target;
+        if (rising ? ahead >= 0.0 : ahead <= 0.0)
             high = middle;
         else
             low = middle;
@@ -145,10 +147,10 @@ static bool search(Over *over, void *state, double target) {
             }
             break;
         }
-        if ((miss < 0.0) == rising)
-            low = guess > low ? guess : low;
-        else
+        if (rising ? miss >= 0.0 : miss <= 0.0)
             high = guess < high ? guess : high;
+        else
+            low = guess > low ? guess : low;
         double following = speed != 0.0 ? guess - miss / speed : 0.5 * (low + high);
         if (!(low <= following && following <= high))
             following = 0.5 * (low + high);
@@ -187,6 +189,8 @@ static bool find_stamp(Over *over, void *state) {
     }
     if (over->v0 * over->v1 < 0.0)
         return false; /* it turns */
+    if (over->until - over->t > SHORTEST_PART && fabs(over->v0 + over->v1) <= over->program->watch.acceleration_limit * (over->until - over->t))
+        return false; /* it may turn twice */
     int64_t number = count_crossed(over);
     over->found = number == 1;
     return number == 0 || (over->found && search(over, state, over->program->watch.places[over->which]));

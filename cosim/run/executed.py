@@ -7,10 +7,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
+from cosim.balises.localiser import SHORTEST_PART
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
 from cosim.diagnostics.call_log import CallLog
@@ -113,6 +115,17 @@ def _warnings_after(
             yield f"{name} logged {counts}; the last says: {component.messages.reason}"
 
 
+def _hidden_passings(services: Services) -> Iterator[str]:
+    """Where a train may have passed a balise there and back within a step that is only known at its ends."""
+    service = services.balises
+    if service is not None and isfinite(service.localiser.hidden_from):
+        yield (
+            f"balises: in a step from t = {service.localiser.hidden_from:g} s on {service.plant} could pass a balise "
+            f"and come back, which '{service.localiser.method}' does not find: it only knows both ends of a step. Take "
+            f"steps of at most {SHORTEST_PART:g} s."
+        )
+
+
 def _missed_samples(components: Mapping[str, Component]) -> Iterator[str]:
     """Notes of the measurements that were missing, one a component that left some out."""
     for name, component in components.items():
@@ -206,6 +219,7 @@ def execute(
     result = _in_si(ready, telegrams, executed.failure)
     remarks.warn(*result_warnings(replace(result, events=[]), spec))  # judged by its rows alone
     remarks.warn(*_warnings_after(ready.coupled.components, telegrams, executed.changed, recorded))
+    remarks.warn(*_hidden_passings(ready.services))
     if call_log is not None and call_log.broken is not None:
         remarks.warn(call_log.broken)
     summary |= _summary(ready, result, spec, premises, remarks)

@@ -5,11 +5,14 @@ Promised: `rollback` 1e-9 s, `predict` 1e-6 s, `interpolate` its own reported bo
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from coupled_runs import Balises, Motion, Pushed, Ran, Staircase, block, positions, prepare, ran, run
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
 from mock_slaves import EventMode, Train, component, variable
 from scipy.optimize import brentq
 
@@ -182,6 +185,85 @@ def test_rollback_finds_where_the_plant_itself_turns() -> None:
     half = [(np.pi - np.arccos((0.5 + d) / 0.5)) / 4.0 for d in offsets[:2]]
     expected = [*half, *(np.pi / 2.0 - t for t in reversed(half))]
     np.testing.assert_allclose([e.stamp for e in seen.events], expected, rtol=0.0, atol=1e-9)
+
+
+def passings(motion: dict[str, float], places: list[float], until: float) -> list[tuple[float, str]]:
+    """When a swinging train passes which balise, by bisection between the instants at which it stands."""
+
+    def place(t: float) -> float:
+        return motion["p0"] + motion["A"] / motion["w"] * (1.0 - np.cos(motion["w"] * t))
+
+    stands = [k * np.pi / motion["w"] for k in range(int(until * motion["w"] / np.pi) + 1)]
+    found = []
+    for begin, end in pairwise([*stands, until]):
+        for i, position in enumerate(places, start=1):
+            if (place(begin) - position) * (place(end) - position) < 0.0:
+                found.append((brentq(lambda t, p=position: place(t) - p, begin, end, xtol=1e-13), f"B{i}"))
+    return sorted(found)
+
+
+@settings(max_examples=25)
+@given(
+    step=st.floats(0.3, 6.0),
+    swing=st.floats(0.3, 3.0),
+    hardest=st.floats(0.5, 5.0),
+    shares=st.lists(st.floats(0.02, 0.98), min_size=1, max_size=3, unique=True),
+    origin=st.sampled_from([-1.0, 0.0, 500.0]),
+)
+@example(step=4.0 * np.pi, swing=1.0, hardest=1.0, shares=[0.5, 0.9], origin=0.0)  # stands where it began at both ends
+@example(step=6.0, swing=np.pi / 3.0, hardest=2.0, shares=[0.5], origin=-1.0)  # there and back within each step
+@pytest.mark.parametrize("method", PROMISED)
+def test_a_train_that_turns_within_a_step_passes_no_balise_in_silence(
+    method: str, step: float, swing: float, hardest: float, shares: list[float], origin: float
+) -> None:
+    """v = A sin(w t), to and fro over 2 A / w, as often within a step as it likes."""
+    motion = {"v0": 0.0, "a": 0.0, "A": hardest / swing, "w": swing, "p0": origin}
+    width = 2.0 * motion["A"] / swing
+    assume(min(shares) * width > 0.01 and (1.0 - max(shares)) * width > 0.01)  # it passes them, and does not just touch
+    places = sorted(origin + share * width for share in shares)
+    assume(np.all(np.diff(places) > 1e-6))
+    seen = run(
+        [block(Motion(), "plant")], [], step, 3, Balises(positions(*places), method=method), starts={"plant": motion}
+    )
+    expected = passings(motion, places, 3.0 * step)
+    certain = [(t, name) for t, name in expected if t < 3.0 * step - 1e-3]
+    assert [e.identity for e in seen.events][: len(certain)] == [name for _, name in certain]
+    off = np.abs(np.array([e.stamp for e in seen.events[: len(certain)]]) - [t for t, _ in certain])
+    assert np.all(off <= PROMISED[method])
+
+
+class Arriving(HybridSystem):
+    """Brakes backwards to a stand at 0 m after 10 s: ``p = 10 (1 - t / 10)^2``."""
+
+    name = "arriving"
+    outputs = (output_signal("position", "m"), output_signal("speed", "m/s"))
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        rest = np.maximum(1.0 - 0.1 * t, 0.0)
+        return {"position": 10.0 * rest**2, "speed": -2.0 * rest}
+
+
+@pytest.mark.parametrize("step", [0.1, 4.0, 30.0])
+def test_a_train_that_arrives_at_a_balise_and_stands_there_passes_it_when_it_arrives(step: float) -> None:
+    seen = run([block(Arriving(), "plant")], [], step, round(60.0 / step), Balises(positions(0.0)))
+    assert [e.stamp for e in seen.events] == pytest.approx([10.0], abs=1e-6)
+    assert abs(seen.events[0].stamp - 10.0) <= seen.events[0].time_bound
+
+
+def test_a_step_that_may_hide_a_balise_is_named_where_only_its_ends_are_known() -> None:
+    """There and back within 6 s over a balise at 1 m; steps of 0.1 s show it, and a balise far off does not count."""
+    motion = {"v0": 0.0, "A": np.pi / 3.0, "w": np.pi / 3.0, "p0": 0.0}
+    for step, place, hidden in ((6.0, 1.0, 0.0), (0.1, 1.0, np.inf), (6.0, 500.0, np.inf)):
+        parts = [block(Motion(), "plant")]
+        seen = run(
+            parts,
+            [],
+            step,
+            round(6.0 / step),
+            Balises(positions(place), method="interpolate"),
+            starts={"plant": motion},
+        )
+        assert seen.master.balises.localiser.hidden_from == hidden
 
 
 def test_the_row_of_an_interpolated_balise_shows_the_plant_on_it() -> None:
