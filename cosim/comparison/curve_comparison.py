@@ -9,7 +9,7 @@ import numpy as np
 from cosim.comparison.curve import Curve
 from cosim.comparison.jumps import Jumps
 from cosim.comparison.points import Allowed, MatchedJumps, Points, compare_points, outside_between
-from cosim.comparison.span import gap_findings, rounding, runs, span_findings, unseen_findings, when, with_unit
+from cosim.comparison.span import rounding, row_findings, runs, when, with_unit
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.tube import band_of
 from cosim.comparison.verdict import ComparisonFinding, Curves, Kind, SignalComparison
@@ -266,12 +266,10 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
 
 
 def _findings(task: Task, points: Points, jumps: MatchedJumps, allowed: Allowed) -> list[ComparisonFinding]:
-    found = span_findings(task.name, task.reference, task.result, allowed.time)
+    found = row_findings(task.name, task.unit, task.reference, task.result, allowed)
     found += _number_findings(task.name, points)
     found += _jump_findings(task.name, task.unit, points, jumps, allowed)
     found += _value_findings(task.name, task.unit, points, allowed)
-    found += gap_findings(task.name, task.reference, task.result, allowed.value, allowed.time)
-    found += unseen_findings(task.name, task.unit, (task.reference, task.result), allowed, found)
     return sorted(found, key=lambda f: (-f.size / f.allowed if f.allowed > 0.0 else -np.inf, f.time))
 
 

@@ -1,13 +1,15 @@
-"""Where the rows of two results begin, end and leave out something. NumPy only; texts come from here too."""
+"""Where the rows of two results begin, end and leave out something: nobody sees what the result does there. NumPy only;
+texts come from here too.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from cosim.comparison.curve import Curve
+from cosim.comparison.curve import BESIDE, Curve
+from cosim.comparison.jumps import NEIGHBOURS
 from cosim.comparison.points import Allowed
 from cosim.comparison.tube import band_of
-from cosim.comparison.unseen import unseen
 from cosim.comparison.verdict import ComparisonFinding, Kind
 
 _MOST_RUNS = (
@@ -58,12 +60,19 @@ def when(begin: float, end: float) -> str:
     return f"at {begin:.9g} s" if begin == end else f"from {begin:.9g} to {end:.9g} s"
 
 
-def span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[ComparisonFinding]:
-    """Starts and ends that are further apart than a time allows.
+def row_findings(name: str, unit: str, reference: Curve, result: Curve, allowed: Allowed) -> list[ComparisonFinding]:
+    """Other begins and ends, gaps, and what the reference does between two rows of the result.
 
     Args:
-        name: of the signal. reference, result: its curves. allowed: time [s].
+        name, unit: of the signal. reference, result: the curves. allowed: difference that is allowed.
     """
+    found = _span_findings(name, reference, result, allowed.time)
+    gaps = _gap_findings(name, reference, result, allowed.value, allowed.time)
+    return [*found, *gaps, *_unseen_findings(name, unit, (reference, result), allowed, gaps)]
+
+
+def _span_findings(name: str, reference: Curve, result: Curve, allowed: float) -> list[ComparisonFinding]:
+    """Starts and ends that are further apart than the allowed time [s]."""
     found = []
     ends: tuple[tuple[float, float, Kind, Kind, str], ...] = (
         (float(reference.time[0]), float(result.time[0]), "starts_early", "starts_late", "starts"),
@@ -87,7 +96,7 @@ def span_findings(name: str, reference: Curve, result: Curve, allowed: float) ->
 _GAP_STEPS = 10  # usual steps without a row make a gap, where the other has at least so many rows
 
 
-def gap_findings(
+def _gap_findings(
     name: str, reference: Curve, result: Curve, allowed: float, allowed_time: float
 ) -> list[ComparisonFinding]:
     """Intervals in which one side has no rows where the other has many that are not on the straight line over the
@@ -116,7 +125,7 @@ def gap_findings(
     return found
 
 
-def unseen_findings(
+def _unseen_findings(
     name: str, unit: str, sides: tuple[Curve, Curve], allowed: Allowed, known: list[ComparisonFinding]
 ) -> list[ComparisonFinding]:
     """Where the reference moves between two rows of the result, beyond the gaps that are known.
@@ -125,8 +134,8 @@ def unseen_findings(
         name, unit: of the signal. sides: reference and result. allowed: difference that is allowed. known: the gaps.
     """
     reference = sides[0]
-    off = unseen(*sides, allowed.time)
-    for gap in (finding for finding in known if finding.kind == "gap"):
+    off = _unseen(*sides, allowed.time)
+    for gap in known:
         off[(reference.time > gap.time) & (reference.time < gap.end)] = 0.0
     found = []
     for a, b in runs(off > allowed.value):
@@ -146,3 +155,52 @@ def _gaps(lacking: Curve, full: Curve) -> np.ndarray:
         return rows
     begin = np.searchsorted(full.time, lacking.time[rows], side="right")
     return np.asarray(rows[np.searchsorted(full.time, lacking.time[rows + 1]) - begin >= _GAP_STEPS])
+
+
+def _unseen(reference: Curve, result: Curve, tolerance: float) -> np.ndarray:
+    """How far each row of the reference is from all that the rows of the result around it say.
+
+    Between two rows a held signal is expected between their values; any other on the straight line between them, but
+    for as much as the result bends nearby: the largest change of its slope times the step. That is four times what a
+    smooth curve does between rows, and bounds a kink or a jump there.
+
+    Args:
+        reference: with more rows. result: with fewer. tolerance: allowed shift [s].
+
+    Returns:
+        Distances [unit], zero at rows of the result and where one side has no number, shape (rows of the reference,).
+    """
+    time, at = result.time, reference.time
+    after = np.clip(np.searchsorted(time, at, side="right"), 1, max(len(time) - 1, 1))
+    if len(time) < 2:
+        return np.zeros(len(at))
+    reach = tolerance + BESIDE * (time[after] - time[after - 1])
+    inside = (at > time[after - 1] + reach) & (at < time[after] - reach)
+    equal = np.diff(at) == 0.0  # jumps are matched, not held against lines
+    inside &= (
+        ~np.append(equal, False)
+        & ~np.append(False, equal)
+        & reference.finite
+        & result.finite[after - 1]
+        & result.finite[after]
+    )
+    if result.held:
+        ends = result.filled[after - 1], result.filled[after]
+        low, high = np.minimum(*ends), np.maximum(*ends)
+    else:
+        band, bend = band_of(result, at, tolerance), _bends(result)[after - 1]
+        low, high = band.low - bend, band.high + bend
+    off = np.maximum(reference.filled - high, low - reference.filled)
+    return np.where(inside, np.maximum(0.0, off), 0.0)
+
+
+def _bends(curve: Curve) -> np.ndarray:
+    """Between each two rows of a curve how far it bends there and nearby [unit], shape (rows - 1,)."""
+    duration = np.diff(curve.time)
+    rows = np.flatnonzero(duration > 0.0)
+    slope = np.diff(curve.filled)[rows] / duration[rows]
+    bend = np.pad(np.abs(np.diff(slope)), NEIGHBOURS)
+    nearby = [bend[k : k + len(rows)] for k in range(2 * NEIGHBOURS)] if len(rows) else [slope]
+    found = np.zeros(len(duration))
+    found[rows] = np.maximum.reduce(nearby) * duration[rows]
+    return found
