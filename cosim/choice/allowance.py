@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 
 from cosim.errors import ScenarioError
-from cosim.evaluation.balise_gaps import EQUAL_WITHIN, FIXED_SHARE, SHARE_OF_DISTANCE, telegrams_read
+from cosim.evaluation.balise_gaps import EQUAL_WITHIN, FIXED_SHARE, SHARE_OF_DISTANCE, telegrams_read, travelled
 from cosim.evaluation.metrics import evaluated_size
 from cosim.evaluation.roles import estimation_error, recorded
 from cosim.evaluation.spec import ReportSpec
@@ -63,7 +63,7 @@ class Allowance:
         position = recorded(result, spec.true_position)
         if position is None or not len(position):
             return None
-        return np.asarray(self.fixed + self.share * np.abs(position - _last_balise(result, position)))
+        return np.asarray(self.fixed + self.share * _since_last_balise(result, travelled(position)))
 
 
 @dataclass(frozen=True)
@@ -98,13 +98,13 @@ def used_allowance(result: Result, spec: ReportSpec, name: str, allowance: Allow
     return UsedAllowance(float(shares[place]), float(time[place]), evaluated_size(time, error).rms, held)
 
 
-def _last_balise(result: Result, position: np.ndarray) -> np.ndarray:
-    """Where the train passed the last balise whose telegram has been delivered, or where it started [m], shape (rows,).
+def _since_last_balise(result: Result, way: np.ndarray) -> np.ndarray:
+    """Way since the last balise whose telegram has been delivered, or since the start [m], shape (rows,).
 
     Args:
-        result: the run. position: true one at its rows [m], shape (rows,).
+        result: the run. way: of the train at its rows [m], shape (rows,).
     """
-    passed = np.full(len(position), position[0])
+    passed = np.zeros(len(way))
     latest = -np.inf
     for event in telegrams_read(result.events):
         if event.stamp < latest:
@@ -113,5 +113,5 @@ def _last_balise(result: Result, position: np.ndarray) -> np.ndarray:
         until = event.delivered_at + EQUAL_WITHIN * max(1.0, abs(event.delivered_at))
         row = int(np.searchsorted(result.time, until, side="right")) - 1
         first = row if result.time[row] >= event.delivered_at - EQUAL_WITHIN * max(1.0, until) else row + 1
-        passed[max(first, 0) :] = float(np.interp(event.stamp, result.time, position))
-    return passed
+        passed[max(first, 0) :] = float(np.interp(event.stamp, result.time, way))
+    return np.asarray(way - passed)

@@ -165,13 +165,14 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
     rows = rows_before(result.time, times)
     speed = recorded(result, spec.true_speed)
     evaluated = np.flatnonzero(times[1:] >= spec.evaluate_after) + 1
+    way = travelled(place)
     gaps = [
         Gap(
             telegrams[i - 1].identity,
             telegrams[i].identity,
             float(times[i - 1]),
             float(times[i]),
-            float(abs(place[rows[i]] - telegrams[i - 1].true_position)),
+            _length(result.time, place, way, telegrams[i - 1], rows[i]),
             nan if speed is None else float(speed[rows[i]]),
         )
         for i in evaluated
@@ -179,6 +180,21 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
     errors = _errors_at(result, spec, rows, evaluated, place)
     labels = {name: PLAIN_ODOMETER if name == PLAIN_ODOMETER else label(spec, name) for name in errors}
     return GapErrors(gaps, errors, labels)
+
+
+def travelled(place: np.ndarray) -> np.ndarray:
+    """Way that the train has made up to each row [m], shape (rows,), also where it comes back.
+
+    Args:
+        place: its true position [m], shape (rows,).
+    """
+    return np.concatenate(([0.0], np.cumsum(np.abs(np.diff(place)))))
+
+
+def _length(time: np.ndarray, place: np.ndarray, way: np.ndarray, passed: BaliseRecord, row: int) -> float:
+    """Way from the passing of a balise to a row [m]."""
+    first = min(int(np.searchsorted(time, passed.stamp)), row)
+    return float(abs(place[first] - passed.true_position) + way[row] - way[first])
 
 
 def _errors_at(

@@ -36,6 +36,15 @@ def test_it_grows_with_the_way_since_the_balise_whose_telegram_has_come() -> Non
     assert allowed.tolist() == pytest.approx([5.0, 6.0, 7.0, 5.5, 6.5, 7.5, 8.5])
 
 
+def test_a_train_that_comes_back_has_made_the_way_there_and_back() -> None:
+    """20 m out and 20 m back: 40 m of way, of which 10 m lie before the balise."""
+    way = run(0.0 * TIME, telegram(1.0, 1.0))
+    way.table["p.position"] = np.interp(TIME, [0.0, 2.0, 4.0, 5.0], [0.0, 20.0, 0.0, -10.0])
+    allowed = Allowance(5.0, 0.1).at(way, SPEC)
+    assert allowed is not None
+    assert allowed.tolist() == pytest.approx([5.0, 5.0, 6.0, 6.0, 7.0, 8.0, 9.0])
+
+
 @pytest.mark.parametrize("other", [telegram(1.5, nan, "missed"), telegram(1.5, 2.0, "false"), telegram(0.0, 4.0)])
 def test_what_was_not_read_or_is_not_there_or_came_too_late_is_no_balise(other: BaliseRecord) -> None:
     alone = Allowance().at(run(0.0 * TIME), SPEC)

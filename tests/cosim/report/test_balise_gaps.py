@@ -5,6 +5,8 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cosim.evaluation.balise_gaps import ENVELOPE, PLAIN_ODOMETER, gap_errors, rows_before
 from cosim.evaluation.spec import ReportSpec
@@ -71,6 +73,22 @@ def test_errors_just_before_the_next_balise(distance: bool) -> None:
     assert found.longest() == [1, 0, 2]
     assert found.longest(1) == [1]
     assert found.within_envelope("a") == 1.0
+
+
+@given(st.floats(0.0, 1.0), st.floats(10.0, 500.0), st.sampled_from([1.0, -1.0]))
+def test_a_gap_is_the_way_that_was_made_also_where_the_train_turned(share: float, out: float, sign: float) -> None:
+    """Past a balise, out, and back to the same one, which is read again: twice the way beyond it."""
+    place = sign * np.concatenate((np.arange(0.0, out, 0.5), np.arange(out, 0.0, -0.5)))
+    at = sign * share * out
+    table = np.zeros(len(place), dtype=[("time", float), ("train.position", float), ("train.speed", float)])
+    table["time"], table["train.position"] = np.arange(len(place)), place
+    turned = int(np.argmax(np.abs(place)))
+    first = float(np.interp(abs(at), np.abs(place[: turned + 1]), table["time"][: turned + 1]))
+    second = float(np.interp(-abs(at), -np.abs(place[turned:]), table["time"][turned:]))
+    events = [BaliseRecord(t, t, "B", at, at) for t in (first, second) if first < second]
+    found = gap_errors(Result(table, [], events), SPEC)
+    for gap in found.gaps:  # a row is half a metre of way
+        assert gap.length == pytest.approx(2.0 * (np.max(np.abs(place)) - abs(at)), abs=1.01)
 
 
 def test_a_distance_that_is_sampled_is_read_between_its_samples() -> None:
