@@ -58,7 +58,7 @@ def execute(options: argparse.Namespace) -> Output:
     specs = [spec_of(result, label) for result, label in zip(results, labels, strict=True)]
     for path, result, spec in zip(paths, results, specs, strict=True):
         if is_guessed(result):
-            LOG.warning("%s does not say which signals play which role; %s", path, _guess(spec))
+            LOG.warning("%s does not say which signals play which role: %s", path, _guess(spec))
     page = (
         _one(options, paths[0], results[0], specs[0]) if len(paths) == 1 else _several(options, results, specs, labels)
     )
