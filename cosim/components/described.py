@@ -70,6 +70,14 @@ class DescribedComponent(fmi.Described):
             self.variables[name]
         )
 
+    def known_values(self, name: str) -> list[tuple[float, str]] | None:
+        """Every value that an output will have, and where it first stands; None where only a run shows it.
+
+        Args:
+            name: of the output.
+        """
+        return None
+
     def choose_tolerance(self, tolerance: float | str | None) -> None:
         """Another relative tolerance than the declared one. FMI 1.0 knows of none.
 

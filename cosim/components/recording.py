@@ -219,6 +219,17 @@ class RecordingComponent(FMI3Component):
         self._take(self.recording.kept(name))
         self.variables[name].variability = "discrete"
 
+    def known_values(self, name: str) -> list[tuple[float, str]] | None:
+        """Every value of a column, with the row of the table in which it first stands.
+
+        Args:
+            name: of the column.
+        """
+        place = [signal.name for signal in self.recording.signals].index(name)
+        values, rows = np.unique(self.recording.values[:, place], return_index=True)
+        first, time = self.recording.first_row, self.recording.time
+        return [(float(values[i]), f"row {first + rows[i] + 1} (t = {time[rows[i]]:.6g} s)") for i in np.argsort(rows)]
+
     def course_of(self, name: str, *, sampled: bool) -> bool:
         """Whether an input follows a column wherever the component stands.
 

@@ -43,6 +43,7 @@ class Recording:
         chosen: names of the columns of which it was said whether they are held.
         lines: columns that the others follow on lines within their steps: those of a table that are not held, and of a
             run those that were lines in it. All others give the value of the end of a step, as they did in the run.
+        first_row: how many rows of the table stand before the first one that is played back.
     """
 
     source: str
@@ -59,6 +60,7 @@ class Recording:
     before_start: Mapping[str, float] = field(default_factory=dict)
     held_links: frozenset[str] = frozenset()
     fresh_links: frozenset[str] = frozenset()
+    first_row: int = 0
 
     @cached_property
     def digest(self) -> str:
@@ -165,6 +167,7 @@ def make_recording(
         _is_run(result),
         _before_start(result, chosen, time[rows][0]),
         *(frozenset(map(str, _algorithm(result).get(key, ()))) for key in ("held", "fresh")),
+        first_row=rows.start or 0,
     )
 
 

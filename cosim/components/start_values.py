@@ -99,13 +99,26 @@ def _start_value(component: DescribedComponent, name: str, value: Any) -> StartV
     variable = component.settable(name)
     is_array = bool(variable.shape) and name in component.variables
     try:
-        values = [_typed(variable, entry) for entry in (_entries(variable, value) if is_array else [value])]
-        for number in values if variable.type in NUMERIC_TYPES else ():
-            _demand_range(variable, number)
+        values = [typed_value(variable, entry) for entry in (_entries(variable, value) if is_array else [value])]
     except ValueError as error:
         end = "" if str(error).endswith("?") else "."
         raise CouplingError(f"{component.name}.{name}: {error}{end}") from error
     return values if is_array else values[0]
+
+
+def typed_value(variable: ModelVariable, value: Any) -> Scalar:
+    """One value of a variable, or of an element of it, in its type.
+
+    Args:
+        variable: of a description. value: as a user wrote it.
+
+    Raises:
+        ValueError: it is not of the variable's type, or lies outside what the component declares.
+    """
+    typed = _typed(variable, value)
+    if variable.type in NUMERIC_TYPES:
+        _demand_range(variable, typed)
+    return typed
 
 
 def _entries(variable: ModelVariable, value: Any) -> list[Any]:
@@ -138,7 +151,6 @@ def _shape(value: Any) -> tuple[int, ...]:
 
 
 def _typed(variable: ModelVariable, value: Any) -> Scalar:
-    """One value of a variable, or of an element of it, in its type."""
     value = value.item() if isinstance(value, np.generic) else value
     kind, is_number = str(variable.type), isinstance(value, (bool, int, float))
     if kind in FLOATING_TYPES and is_number:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from fmpy.model_description import ModelVariable
 
 from cosim.components.component import Component
+from cosim.components.start_values import typed_value
 from cosim.coupling.transformation import Transformation
 from cosim.errors import CouplingError, nearest
 from fmu_observer.annotated_variable import is_optional
@@ -228,6 +229,9 @@ def _exact(
     output = _connectable(components[source[0]], source[1], *SOURCES)
     name = _connectable(components[target[0]], target[1], "input")
     reason = _misfit(output, name)
+    known = components[source[0]].known_values(source[1]) if _would_be_rounded(output, name) else None
+    if known is not None:
+        reason = _unfit_value(known, name, transformation)
     if reason:
         types = f"{'.'.join(source)} is a {output.type}, {'.'.join(target)} is a {name.type}"
         raise CouplingError(f"Connection {'.'.join(source)} -> {'.'.join(target)}: {types}; {reason}.")
@@ -246,12 +250,26 @@ def _misfit(source: ModelVariable, target: ModelVariable) -> str:
     """Why a value of one type is no value of another, or an empty text.
 
     Floating-point numbers fit one another, and so do integers, truth values and enumerations; those also fit
-    floating-point inputs, not the other way round. Texts fit texts, bytes fit bytes.
+    floating-point inputs, not the other way round, unless all values are known. Texts fit texts, bytes fit bytes.
     """
     if source.type not in NUMERIC_TYPES or target.type not in NUMERIC_TYPES:
         return "" if source.type == target.type else "only equal types fit here"
-    if source.type in FLOATING_TYPES and target.type not in FLOATING_TYPES:
+    if _would_be_rounded(source, target):
         return "a floating-point number is not rounded on its way; round it in a component between them"
+    return ""
+
+
+def _would_be_rounded(source: ModelVariable, target: ModelVariable) -> bool:
+    return source.type in FLOATING_TYPES and target.type in NUMERIC_TYPES - FLOATING_TYPES
+
+
+def _unfit_value(known: Sequence[tuple[float, str]], target: ModelVariable, transformation: Transformation) -> str:
+    """Which of the values that a column has is none of the target, and where it stands; empty where all are."""
+    for value, place in known:
+        try:
+            typed_value(target, transformation.of(value))
+        except ValueError as error:
+            return f"{place}: {str(error).rstrip('.')}"
     return ""
 
 

@@ -25,6 +25,10 @@ class Transformation:
     convert_units: bool = True
     table: tuple[tuple[float, float], ...] = ()
 
+    def of(self, value: float) -> float:
+        """The value of the target, for a value in its unit."""
+        return dict(self.table).get(value, self.factor * value + self.offset)
+
     def after(self, factor: float, offset: float) -> tuple[float, float]:
         """``(factor, offset)`` of a unit conversion and this linear transformation in a row."""
         if (self.factor, self.offset) == (1.0, 0.0):
