@@ -164,8 +164,7 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
     times = np.array([event.delivered_at for event in telegrams])
     rows = rows_before(result.time, times)
     speed = recorded(result, spec.true_speed)
-    evaluated = np.flatnonzero(times[1:] >= spec.evaluate_after) + 1
-    way = travelled(place)
+    way, evaluated = travelled(place), np.flatnonzero(times[1:] >= spec.evaluate_after) + 1
     gaps = [
         Gap(
             telegrams[i - 1].identity,

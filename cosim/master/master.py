@@ -131,7 +131,8 @@ class Master:
         events: of the components: ``propagate`` them to others at the same instant, or leave them ``local``.
         network: over which measurements travel, or None.
 
-    `between_steps` is called between two steps, or chunks of the compiled stepper; it may raise KeyboardInterrupt.
+    `initialised` is called once before the first step, `between_steps` between two steps, or chunks of the compiled
+    stepper; they may raise KeyboardInterrupt.
 
     After `run`, `recorder`, `timing`, `exchange_rounds` and `balises.mailbox.log` hold what came out, also when it
     failed.
@@ -166,6 +167,7 @@ class Master:
         self._stepper: StepperChoice | None = None
         self._choose_stepper = stepper
         self.between_steps: Callable[[], None] | None = None
+        self.initialised: Callable[[], None] | None = None
 
     def choose_stepper(self) -> StepperChoice:
         """Choose who executes the plan, where nobody did before; `run` does so too.
@@ -201,6 +203,8 @@ class Master:
             self.system.start(self.axis.start)
             self.recorder.add(self.axis.start, self.plan.values)
             self._check_finite(self.axis.start)
+            if self.initialised is not None:
+                self.initialised()
         finally:
             self.timing.initialisation = perf_counter() - begin
         begin = perf_counter()

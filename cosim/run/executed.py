@@ -239,12 +239,8 @@ def _step(ready: Ready, interruption: Interruption, remarks: Remarks) -> _Execut
         surroundings.compare()
         interruption.check()
 
-    def before_first_step() -> None:
-        ready.master.between_steps = between_steps
-        remarks.warn(*values_not_taken(ready.coupled))
-        between_steps()
-
-    ready.master.between_steps = before_first_step
+    ready.master.between_steps = between_steps
+    ready.master.initialised = lambda: remarks.warn(*values_not_taken(ready.coupled))
     try:
         ready.master.run()
     except CosimError as error:
