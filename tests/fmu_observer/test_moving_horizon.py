@@ -379,6 +379,28 @@ def test_a_window_that_refuses_one_balise_or_none_does_not_begin_anew(at: float)
     assert restarts[-1] == 0.0
 
 
+@pytest.mark.parametrize(("speed", "locked", "recover"), [(15.0, 3.0, 4.0), (6.0, 2.0, 5.0)])
+def test_a_wheel_that_is_locked_from_the_start_is_left_once_it_turns_again(
+    speed: float, locked: float, recover: float
+) -> None:
+    """The window believes that the train stands, and doubts the right readings for `odometer_recover`, no longer."""
+    runtime = Runtime(BaliseMovingHorizon(3))
+    names, parameters = (
+        [s.name for s in kind] for kind in (runtime.system.input_signals, runtime.system.parameter_signals)
+    )
+    runtime.p[parameters.index("odometer_recover")] = recover
+    runtime.u[names.index("effort")] = 900.0 + 32.4 * speed + 1.65287 * speed**2  # as fast all the time
+    runtime.x[:2] = 0.0, speed
+    runtime.start(0.0)
+    found = []
+    for k in range(1, round((locked + recover + 3.0) / 0.1) + 1):
+        runtime.u[names.index("odometer")] = speed if 0.1 * k > locked else 0.0
+        runtime.advance(0.1 * k)
+        found.append(runtime.update_outputs()[[s.name for s in runtime.system.outputs].index("speed")])
+    assert abs(found[round(10 * (locked + recover)) - 5]) < 0.2 * speed
+    assert abs(found[-1] - speed) < 0.3
+
+
 def test_with_squares_and_no_active_bound_it_is_the_filter() -> None:
     filtered = run_train(OBSERVERS["balise_odometer_ekf"](), 0.0, 9.0)
     assert np.abs(run_train(BaliseMovingHorizon(5, loss="squares"), 0.0, 9.0) - filtered).max() <= 1e-9

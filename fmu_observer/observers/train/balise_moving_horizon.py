@@ -41,7 +41,7 @@ from plant_models.hybrid.option import require_chosen
 WINDOW, PASSES = 10, 2  # rows and passes unless set otherwise: small, so that it is built in a second [ours]
 LAYOUT = RowLayout(inputs=ORDER + 5, measurements=1)
 OFFSETS, SPEED, EFFORT = slice(0, ORDER), ORDER, ORDER + 1  # inputs of a row
-_IS_BALISE, _ANEW, ACCURACY = ORDER + 2, ORDER + 3, ORDER + 4
+_IS_BALISE, _UNKNOWN, ACCURACY = ORDER + 2, ORDER + 3, ORDER + 4
 _WINDOW_PARAMETERS = (
     parameter("speed_limit", "m/s", 100.0, "Highest speed, either way", min=0.1),
     parameter("disturbance_limit", "m/s2", 1.0, "Largest unknown acceleration, either way", min=1e-6),
@@ -56,6 +56,7 @@ _RESTARTS = warning_output(
 )
 
 
+_ESTIMATES = ("estimated_position", "estimated_speed", "estimated_disturbance", "estimated_creep")
 _REFUSALS = (
     memory("balises_believed", "1", 0.0, "Balises believed since the position began"),
     memory("balises_refused", "1", 0.0, "Balises refused in a row that agree"),
@@ -105,7 +106,8 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
     A false balise that comes first is believed, and the true ones after it are doubted. So balises in a row whose
     innovations are beyond `loss_scale` of their own deviations, and agree with each other within that, are counted.
     Where there are more of them than were believed, or `gate_recover`, the position begins anew at the last of them,
-    and `restarts` shows it.
+    and `restarts` shows it. A wheel that is locked from the start is believed, and doubted when it turns again: after
+    `odometer_recover` without a reading within `odometer_gate` the speed begins anew at the reading, as in the filter.
 
     With the loss ``squares``, no bound active and every reading within its gate it is `BaliseOdometerEkf` at every
     window.
@@ -163,13 +165,16 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """The window with a row more, and the estimates that it gives."""
-        filtered, estimate = super().update(event, t, x, u, p), estimate_of(x)
+        filtered, fresh = self.corrected(event, t, x, u, p)
+        estimate = np.where(fresh > 0.0, vector(*(filtered[name] for name in _ESTIMATES)), estimate_of(x))
         begun = x.last_pass[list(WINDOW_OUTPUTS).index("rows_in_window")] > 0.5
         shared = vector(*(getattr(p, name) for name in Shared._fields))
         start = np.hstack([estimate, estimate, np.reshape(x.estimate_covariance, (ORDER * ORDER,))])
         before = np.where(begun, x.window_estimates[-ORDER:], estimate)
         refusals = self._refusals(event, x, u, p, filtered)
-        row = self._row(event, t, x, u, p, before, refusals["restart_count"] - x.restart_count)
+        unknown = (refusals["restart_count"] - x.restart_count) * FIRST_DEVIATIONS[P] ** 2
+        unknown = unknown + fresh * filtered["estimate_covariance"][P, P]
+        row = self._row(event, t, x, u, p, (before, estimate), unknown)
         found = self.iterate(
             self.problem,
             self.passes,
@@ -217,13 +222,18 @@ class BaliseMovingHorizon(BaliseOdometerEkf):
         again = np.where(near, any_before, False)  # reported twice, it is one
         return {name: np.where(again, old[name], now[name]) for name in now}
 
-    def _row(self, event: str, t: Array, x: Any, u: Any, p: Any, before: Array, anew: Array) -> WindowRow:
-        """The row that an event brings: what the flow added to the linear transition, and the measurement."""
+    def _row(
+        self, event: str, t: Array, x: Any, u: Any, p: Any, course: tuple[Array, Array], unknown: Array
+    ) -> WindowRow:
+        """The row that an event brings: what the flow added to the linear transition, and the measurement. The course
+        is the estimate before and now, the unknown what is added to the variance of the position [m2].
+        """
+        before, estimate = course
         period, is_balise, speed = t - x.last_time, float(event == BALISE.name), x.estimated_speed
-        offset = estimate_of(x) - transition(period, speed, u.effort, p).F @ before
+        offset = estimate - transition(period, speed, u.effort, p).F @ before
         measured = u.balise_position if event == BALISE.name else self.reading(t, x, u, p)
         accuracy = known_accuracy(u.balise_location_accuracy) if event == BALISE.name else 0.0
-        inputs = vector(*(offset[i] for i in range(ORDER)), speed, u.effort, is_balise, anew, accuracy)
+        inputs = vector(*(offset[i] for i in range(ORDER)), speed, u.effort, is_balise, unknown, accuracy)
         return WindowRow(1.0, period, t, inputs, vector(measured), np.ones(1))
 
 
@@ -233,8 +243,9 @@ def _shared(flat: Array) -> Shared:
 
 def _moved(x: Array, row: WindowRow, shared: Array) -> Moved:
     F, noise = transition(row.period, row.inputs[SPEED], row.inputs[EFFORT], _shared(shared))
-    unknown = row.inputs[_ANEW] * np.diag([FIRST_DEVIATIONS[P] ** 2, 0.0, 0.0, 0.0])
-    return Moved(F @ x + row.inputs[OFFSETS], F, noise + unknown)
+    place, speed = row.inputs[_UNKNOWN], np.where(row.inputs[_IS_BALISE] > 0.5, 0.0, row.inputs[_UNKNOWN])
+    anew = vector(place, *(np.where(speed > 0.0, d**2, 0.0) for d in FIRST_DEVIATIONS[V:]))
+    return Moved(F @ x + row.inputs[OFFSETS], F, noise + np.eye(ORDER) * anew)
 
 
 def _seen(x: Array, row: WindowRow, shared: Array) -> Seen:

@@ -180,6 +180,14 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
 
     def update(self, event: str, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
         """Covariance over the time since the last event, then correction by the reading or the balise."""
+        return self.corrected(event, t, x, u, p)[0]
+
+    def corrected(self, event: str, t: Array, x: Any, u: Any, p: Any) -> tuple[dict[str, Array], Array]:
+        """What an event makes of the states, and 1 where the speed begins anew after refused readings, else 0.
+
+        Args:
+            event, t, x, u, p: as for `update`.
+        """
         is_balise = event == BALISE.name
         before, estimate = self.covariance_now(t, x, u, p), estimate_of(x)
         if is_balise:
@@ -199,7 +207,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
         refused_time = x.refused_time if is_balise else refused * (x.refused_time + p.odometer_period)
         anew = refused * np.where(refused_time + ROUNDING >= p.odometer_recover, 1.0, 0.0)
         new = _anew(estimate, before, error, refused_time)
-        return {
+        values = {
             **estimates(np.where(anew > 0.0, new[0][i], kept[i]) for i in range(ORDER)),
             "estimate_covariance": np.where(anew > 0.0, new[1], covariance),
             "last_time": t,
@@ -208,6 +216,7 @@ class BaliseOdometerEkf(GatedObserver, GapCertified):
             "log_likelihood": x.log_likelihood + np.where(refused > 0.0, 0.0, likelihood),
             "refused_time": refused_time * (1.0 - anew),
         }
+        return values, anew
 
     def covariance_now(self, t: Array, x: Any, u: Any, p: Any) -> Array:
         """The covariance a time after the last event, shape (4, 4)."""
