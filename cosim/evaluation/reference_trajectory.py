@@ -95,7 +95,8 @@ def reference_trajectory(
         ScenarioError: too few readings, no balise, or a number that is not positive.
     """
     _check(len(time), len(stamps), odometer_std, balise_std, jerk_density, scale_std)
-    instants, samples, R = _samples(time, odometer, stamps, positions, odometer_std, balise_std)
+    instants, samples = _samples(time, odometer, stamps, positions)
+    R = _covariances(instants, stamps, odometer_std, balise_std)
     steps = np.diff(instants)
     first = float(odometer[0])
     run = float(np.ptp(instants)) * max(float(np.abs(odometer).max()), 1.0)
@@ -145,26 +146,25 @@ def _check(
 
 
 def _samples(
-    time: np.ndarray,
-    odometer: np.ndarray,
-    stamps: np.ndarray,
-    positions: np.ndarray,
-    odometer_std: float,
-    balise_std: float | np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All instants, shape (n,), reading and position at each, NaN where there is none, shape (n, 2), and their
-    covariance, shape (n, 2, 2).
-    """
+    time: np.ndarray, odometer: np.ndarray, stamps: np.ndarray, positions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """All instants, shape (n,), and reading and position at each, NaN where there is none, shape (n, 2)."""
     instants = np.union1d(time, stamps)
     samples = np.full((len(instants), 2), np.nan)
     samples[np.searchsorted(instants, time), 0] = odometer
-    at = np.searchsorted(instants, stamps)
-    samples[at, 1] = positions
+    samples[np.searchsorted(instants, stamps), 1] = positions
+    return instants, samples
+
+
+def _covariances(
+    instants: np.ndarray, stamps: np.ndarray, odometer_std: float, balise_std: float | np.ndarray
+) -> np.ndarray:
+    """Of reading and position at all instants, shape (n, 2, 2)."""
     spreads = np.full(len(instants), 1.0)
-    spreads[at] = balise_std
+    spreads[np.searchsorted(instants, stamps)] = balise_std
     R = np.zeros((len(instants), 2, 2))
     R[:, 0, 0], R[:, 1, 1] = odometer_std**2, spreads**2
-    return instants, samples, R
+    return R
 
 
 def _moved(x: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:

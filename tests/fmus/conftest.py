@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exchange_importer import INSTANCE, Exchange, description_of, pass_initialization
+from exchange_importer import INSTANCE, Exchange, callbacks_into, description_of, pass_initialization
 from fmpy import extract
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from shipped import shipped
 from toy_systems import Booster
@@ -306,8 +306,7 @@ class Component:
 
     def instantiate(self, logging: bool = False) -> None:
         if self.version == 2:
-            self._callbacks = fmi2CallbackFunctions()
-            self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda *a: self.log.append(_text(a[4])))
+            self._callbacks = callbacks_into(self.log)
             self.slave.instantiate(callbacks=self._callbacks, loggingOn=logging)
         else:
             self.slave.instantiate(

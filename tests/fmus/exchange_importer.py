@@ -54,6 +54,13 @@ def description_of(fmu: Path) -> ModelDescription:
     return read_model_description(str(fmu), validate=False)
 
 
+def callbacks_into(log: list[str]) -> fmi2CallbackFunctions:
+    """Callbacks of FMI 2 that append what is logged."""
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(lambda *a: log.append(_text(a[4])))
+    return callbacks
+
+
 def pass_initialization(instance: Any, version: int, start_time: float) -> None:
     """From instantiated to initialised, of either interface type."""
     if version == 2:
@@ -86,8 +93,7 @@ class Exchange:
 
     def _instantiate(self, logging: bool) -> None:
         if self.version == 2:
-            self._callbacks = fmi2CallbackFunctions()
-            self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda *a: self.log.append(_text(a[4])))
+            self._callbacks = callbacks_into(self.log)
             self.model.instantiate(callbacks=self._callbacks, loggingOn=logging)
         else:
             self.model.instantiate(loggingOn=logging, logMessage=lambda *a: self.log.append(_text(a[3])))
