@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_results import compared, kinds, made
 
@@ -17,6 +17,7 @@ DEFAULT = Tolerance()
 CODES = st.lists(st.integers(-(10**12), 10**12), min_size=3, max_size=20)
 
 
+@settings(deadline=None, max_examples=30)
 @given(CODES, st.integers(1, 3), st.data())
 def test_a_code_that_is_a_little_off_differs(codes: list[int], off: int, data: st.DataObject) -> None:
     time, values = np.arange(len(codes)), np.array(codes, dtype=float)
@@ -64,6 +65,7 @@ def test_a_number_that_vanishes_is_the_result_s_though_the_baseline_rounds_its_i
     assert not compared(made(time, y=values), made(time, y=time), DEFAULT).equal
 
 
+@settings(deadline=None, max_examples=30)
 @given(st.integers(3, 30), st.integers(1, 4), st.booleans())
 def test_a_change_in_the_last_row_is_seen(rows: int, finer: int, lost: bool) -> None:
     coarse, fine = np.arange(float(rows)), np.arange(0.0, rows - 0.9, 1.0 / finer)
@@ -74,6 +76,7 @@ def test_a_change_in_the_last_row_is_seen(rows: int, finer: int, lost: bool) -> 
         assert compared(reference, result, Tolerance(time=2.0)).equal
 
 
+@settings(deadline=None, max_examples=20)
 @given(st.floats(-2e9, 2e9))
 def test_what_is_seen_does_not_depend_on_where_time_begins(start: float) -> None:
     time = start + np.arange(101) * 0.1
