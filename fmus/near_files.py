@@ -9,6 +9,24 @@ _ALIKE = 0.65
 _MOST = 3
 
 
+_KINDS = {".toml": "a scenario", ".ssp": "a scenario", ".fmu": "an FMU", ".csv": "a table", ".mat": "a table"}
+"""What files are, by their endings."""
+
+
+def what_it_is(path: Path) -> str:
+    """What stands at a path, where something else was expected.
+
+    Args:
+        path: as it was stated.
+
+    Returns:
+        Such as "a scenario"; empty where there is nothing, or a file of a kind that is not known.
+    """
+    if path.is_dir():
+        return "a results folder" if (path / "summary.json").is_file() else "a folder"
+    return _KINDS.get(path.suffix.lower(), "") if path.is_file() else ""
+
+
 def missing_file(path: Path, *endings: str) -> str:
     """That a file does not exist, with what may be meant.
 

@@ -54,7 +54,9 @@ def recipe(name: str, **options: Any) -> HybridSystem:
         ValueError: an option has a value that the system refuses.
     """
     if name not in RECIPES:
-        raise UnknownRecipeError(f"There is no model named {name!r}{_nearest(name, RECIPES)}; 'fmus list' shows all.")
+        raise UnknownRecipeError(
+            f"There is no model named {name!r}{_nearest(name, RECIPES) or '.'} 'fmus list' shows all."
+        )
     known = _recipe_options(name)
     for option in options:
         if option not in known:

@@ -25,6 +25,7 @@ from cosim.errors import BaselineError, OutputError, nearest
 from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.table_layout import table_dtype
+from fmus.near_files import what_it_is
 from fmus.tables.plain_data import jsonable
 
 Change = Literal["new", "changed", "unchanged"]
@@ -326,8 +327,11 @@ def _demand_no_folder(path: Path) -> None:
 
 def _read_header(path: Path) -> Header:
     if not path.is_file():
+        stated = path.with_suffix("")
+        if kind := what_it_is(stated):
+            raise BaselineError(f"{stated} is {kind}; expected the .json of a baseline. {_HOW_TO_MAKE}")
         others = sorted(other.name for other in path.parent.glob("*.json")) if path.parent.is_dir() else []
-        near = f" {path.parent} holds others; {nearest(path.name, others)}" if others else ""
+        near = f" That folder holds others; {nearest(path.name, others)}" if others else ""
         raise BaselineError(f"There is no baseline {path}.{near} {_HOW_TO_MAKE}")
     text = _demanded(path, "it is the header of a baseline")
     try:

@@ -35,8 +35,26 @@ QUIET = argument("--quiet", action="store_true", help="no progress")
 PARAMETERS_FILE = argument("--toml", type=Path, metavar="FILE", help="write the parameters for a scenario")
 
 
+def positive(text: str) -> int:
+    """A whole number of at least 1, for an option of a command.
+
+    Args:
+        text: as it was typed.
+
+    Raises:
+        argparse.ArgumentTypeError: it is something else.
+    """
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(no_number(text, whole=True)) from None
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1 (got {value})")
+    return value
+
+
 MANY_RUNS = (
-    argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1)"),
+    argument("--workers", type=positive, default=1, metavar="N", help="processes at a time (default: 1)"),
     argument(
         "--scheduler",
         metavar="tcp://HOST:PORT",
@@ -77,21 +95,3 @@ def scenario_arguments(default: str | None = _DEFAULT_SCENARIO) -> tuple[Argumen
         return argument("scenario", help=what), settings_argument()
     optional = argument("scenario", nargs="?", default=default, help=f"{what} (default: {default})")
     return optional, settings_argument()
-
-
-def positive(text: str) -> int:
-    """A whole number of at least 1, for an option of a command.
-
-    Args:
-        text: as it was typed.
-
-    Raises:
-        argparse.ArgumentTypeError: it is something else.
-    """
-    try:
-        value = int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(no_number(text, whole=True)) from None
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"must be at least 1 (got {value})")
-    return value

@@ -98,6 +98,8 @@ _COLUMNS = (
 
 
 def _make(options: argparse.Namespace) -> Output:
+    if Path(options.subject).suffix.lower() == ".json":
+        raise BaselineError(f"{options.subject}: expected what is run, an FMU or a scenario, and behind it FILE.json.")
     path = _free(baseline_path(options.file), options.force)
     tolerances = chosen_tolerances(options, asked_tolerances(options), Tolerances())
     subject = _subject(options)

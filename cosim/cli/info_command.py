@@ -52,7 +52,7 @@ def execute(options: argparse.Namespace) -> Output:
 def _described_file(path: Path) -> dict[str, Any]:
     if path.suffix.lower() == ".toml":
         raise ScenarioError(f"{path} is a scenario; 'cosim show {path}' shows what is in it.")
-    description = read_description(path, "info")  # which says what is wrong with a file
+    description = read_description(path, path.name)  # which says what is wrong with a file
     declared = list(read_capabilities(description).declared())
     return {"runs here": runs_here(path), "declares": declared} | describe_file(path)
 

@@ -20,6 +20,7 @@ from cosim.run.component_models import make_declared
 from cosim.scenario.scenario_tables import ComponentTable
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
+from fmus.near_files import what_it_is
 from plant_models.hybrid import HybridSystem
 from plant_models.user_file import names_code
 
@@ -112,6 +113,8 @@ def _of_fmu(options: argparse.Namespace, settings: dict[str, float]) -> Linearis
 def _of_model(options: argparse.Namespace, settings: dict[str, float]) -> Linearisation:
     name, rooms = options.model, {"model": plant_models.PLANTS, "observer": fmu_observer.OBSERVERS}
     kind = next((kind for kind, room in rooms.items() if name in room), "model" if names_code(name) else None)
+    if kind is None and (is_what := what_it_is(Path(name))):
+        raise ScenarioError(f"{name} is {is_what}; expected an .fmu file, or a plant or observer by name.")
     if kind is None:
         known = [*plant_models.PLANTS, *fmu_observer.OBSERVERS]
         raise ScenarioError(f"There is no plant or observer {name!r}, and it is no .fmu file; {nearest(name, known)}")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.run.component_models import make_declared
 from cosim.scenario.scenario_tables import ComponentTable
 from fmu_observer import OBSERVERS
+from fmus.near_files import what_it_is
 from fmus.recipes import legal_values
 from plant_models import PLANTS
 from plant_models.explained_error import explained
@@ -17,6 +19,7 @@ from plant_models.hybrid import Signal, TracingError
 from plant_models.user_file import names_code
 
 _REGISTRIES = {"model": PLANTS, "observer": OBSERVERS}
+_ARTICLES = {"model": "a plant", "observer": "an observer"}
 
 
 def declared_model(
@@ -34,6 +37,11 @@ def declared_model(
     key = next((kind for kind in kinds if name in _REGISTRIES[kind]), kinds[-1])
     if name not in _REGISTRIES[key] and not names_code(name):
         known = [one for kind in kinds for one in _REGISTRIES[kind]]
+        other = next((kind for kind, room in _REGISTRIES.items() if name in room), None)
+        is_what = _ARTICLES[other] if other else what_it_is(Path(name))
+        if is_what:
+            expected = " or ".join(_ARTICLES[kind] for kind in kinds)
+            raise ScenarioError(f"{name} is {is_what}; expected the name of {expected}, or file.py:Class.")
         raise ScenarioError(f"There is no {' or '.join(kinds)} {name!r}; {nearest(name, known)}")
     return make_declared(ComponentTable.model_validate({key: name, "options": options or {}}), where)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim import studies
-from cosim.cli.arguments import FIGURE_FILES, MANY_RUNS, QUIET, many_runs, scenario_arguments
+from cosim.cli.arguments import FIGURE_FILES, MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
 from cosim.cli.scenarios import load_scenario, parse_setting
 from cosim.errors import ScenarioError, nearest
 from cosim.results.results_folder import FIGURES, check_writable
@@ -55,7 +55,7 @@ ARGUMENTS = (
     argument(
         "--zip", action="store_true", help="first values together, then second ones, ... instead of all combinations"
     ),
-    argument("--samples", type=int, metavar="N", help="N points of a Latin hypercube over ranges and lists"),
+    argument("--samples", type=positive, metavar="N", help="N points of a Latin hypercube over ranges and lists"),
     argument("--seed", type=int, default=0, help="of the points (default: 0)"),
     argument("--out", metavar="DIR", help="folder for the results (default: results/NAME_sweep)"),
     argument("--table-only", action="store_true", help="keep the table, and no results folder for each run"),

@@ -77,4 +77,4 @@ def open_fmu(path: Path, name: str) -> Archive:
     try:
         return read_archive(path)
     except NotAnFmuError as error:
-        raise FmuLoadError(f"{name}: {error}") from error
+        raise FmuLoadError(str(error) if name == path.name else f"{name}: {error}") from error

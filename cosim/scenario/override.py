@@ -101,6 +101,8 @@ def override(tables: dict[str, Any], name: str, value: Any) -> tuple[str, ...]:
             override(tables, key, entry)
         return (name,)
     if "." not in name:
+        if name in (tables.get("components") or {}):
+            raise ScenarioError(f"{name!r} is a component; set one of its keys or parameters, such as {name}.preset.")
         tables[name] = value
         return (name,)
     keys = _keys(tables, name)

@@ -6,12 +6,12 @@ Unknown keys, wrong types and values out of range are refused with the place and
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from functools import cache
 from math import ulp
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
     AfterValidator,
@@ -34,8 +34,6 @@ from cosim.scenario.scenario_tables import (
     BalisesTable,
     ComponentTable,
     ConnectionItem,
-    ConnectionTable,
-    IterationTable,
     MasterTable,
     ReportTable,
     Tolerance,
@@ -303,19 +301,21 @@ def _is_form(place: str) -> bool:
 
 
 def _known_keys(location: tuple[Any, ...]) -> list[str]:
-    table: type[TomlTable] = ScenarioTable
-    tables: dict[str, type[TomlTable]] = {
-        "components": ComponentTable,
-        "connections": ConnectionTable,
-        "balises": BalisesTable,
-        "network": NetworkTable,
-        "master": MasterTable,
-        "report": ReportTable,
-    }
-    if len(location) > 1:
-        table = tables.get(str(location[0]), ScenarioTable)
-    if location[:2] == ("master", "iteration"):
-        table = IterationTable
+    """The keys of the table in which a place lies."""
     if location[0] == "expect" and len(location) > 3:
-        return [field.alias or name for name, field in EXPECTATIONS[str(location[2])].model_fields.items()]
+        table: Any = EXPECTATIONS[str(location[2])]
+    else:
+        table = ScenarioTable
+        for part in location[:-1]:
+            field = table.model_fields.get(part)
+            inner = next(_tables(field.annotation), None) if field is not None else None
+            table = inner or table
     return [field.alias or name for name, field in table.model_fields.items()]
+
+
+def _tables(annotation: Any) -> Iterator[type[TomlTable]]:
+    """The tables that a value of a type may hold."""
+    if isinstance(annotation, type) and issubclass(annotation, TomlTable):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _tables(part)

@@ -217,8 +217,9 @@ class CommandProgram:
         options = argparse.Namespace(command_line=shlex.join([self.name, *words]))
         try:  # reading the words loads the command, which may be interrupted too
             self.parser(words).parse_args(words, options)
-            with self.within(), warnings_in_lines(whole=options.verbose):
-                output: Output = options.execute(options)
+            with self.within():
+                with warnings_in_lines(whole=options.verbose):
+                    output: Output = options.execute(options)
                 return output.show(self.name, as_json=options.json)
         except BrokenPipeError:  # whoever read has seen enough, as `head` does
             forget_output()

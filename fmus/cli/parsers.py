@@ -90,6 +90,8 @@ class Parser(argparse.ArgumentParser):
             self.error(f"{unknown[0]} has become {now}")
         known = [option for action in self._actions for option in action.option_strings]
         near = get_close_matches(unknown[0].partition("=")[0], known, 1) if unknown[0].startswith("-") else []
+        if near == ["--set"] and unknown[0].partition("=")[0] not in ("--se", "--sets"):
+            near = [f"--set {unknown[0].partition('=')[0].lstrip('-')}=VALUE"]
         self.error(f"no option {unknown[0]}; did you mean {near[0]}?" if near else f"not expected: {' '.join(unknown)}")
 
 

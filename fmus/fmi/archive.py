@@ -18,7 +18,7 @@ from fmus.fmi.binaries import platform_folder, platforms_with, why_not_here
 from fmus.fmi.description import FILE, read_description
 from fmus.fmi.sense import distinguish, nonsense
 from fmus.fmi.standard import INTERFACES
-from fmus.near_files import missing_file
+from fmus.near_files import missing_file, what_it_is
 
 MAX_UNPACKED_BYTES = 2 * 1024**3
 MAX_FILES = 100_000
@@ -111,12 +111,15 @@ def open_archive(path: Path, max_bytes: int = MAX_UNPACKED_BYTES, versions: Sequ
         NotAnFmuError: it is missing, broken, dangerous, no FMU, or of an FMI version that is not known here.
     """
     if not path.is_file():
-        what = f"{path} is a folder, expected an .fmu file." if path.is_dir() else missing_file(path, ".fmu")
-        raise NotAnFmuError(f"FMU {what}")
+        if path.is_dir():
+            raise NotAnFmuError(f"{path} is {what_it_is(path)}; expected an .fmu file.")
+        raise NotAnFmuError(f"FMU {missing_file(path, '.fmu')}")
     try:
         with zipfile.ZipFile(path) as archive:
             entries = archive.infolist()
     except (zipfile.BadZipFile, OSError, EOFError, ValueError, NotImplementedError) as error:
+        if path.suffix.lower() != ".fmu" and (kind := what_it_is(path)):
+            raise NotAnFmuError(f"{path} is {kind}; expected an .fmu file.") from error
         raise NotAnFmuError(f"{path} is not a readable FMU: not a zip archive, or a broken one ({error}).") from error
     demand_harmless(path, entries, max_bytes)
     description = _description(path, [entry.filename for entry in entries], versions)

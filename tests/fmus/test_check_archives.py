@@ -47,7 +47,7 @@ def refused(path: Path, match: str) -> None:
 
 def test_missing_files_folders_and_no_archives(tmp_path: Path) -> None:
     refused(tmp_path / "none.fmu", "does not exist")
-    refused(tmp_path, "is a folder, expected an .fmu file")
+    refused(tmp_path, "is a folder; expected an .fmu file")
     text = tmp_path / "text.fmu"
     text.write_text("hello")
     refused(text, "not a readable FMU: not a zip archive")

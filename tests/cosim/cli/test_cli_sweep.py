@@ -111,7 +111,6 @@ def test_samples_are_those_of_the_seed(file: Path, tmp_path: Path, capsys: pytes
         (["--vary", "train.mass=1:1000", "--vary", "stop=1:1000"], "998001 variations are more than 100000"),
         (["--vary", "train.mass=1e4..2e4", "--samples", "1000000000"], "1000000000 variations are more"),
         (["--vary", "stop=0.1", "--zip", "--samples", "3"], "exclude each other"),
-        (["--vary", "stop=0.1", "--workers", "0"], "at least one worker"),
     ],
 )
 def test_a_mistake_ends_in_words(

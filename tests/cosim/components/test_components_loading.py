@@ -65,7 +65,7 @@ def refused(path: Path, match: str) -> None:
 
 def test_missing_files_and_folders(tmp_path: Path) -> None:
     refused(tmp_path / "none.fmu", r"toy: FMU .*none.fmu does not exist")
-    refused(tmp_path, r"is a folder, expected an .fmu file")
+    refused(tmp_path, r"is a folder; expected an .fmu file")
 
 
 def test_what_is_no_archive(tmp_path: Path) -> None:

@@ -196,6 +196,18 @@ COMMANDS = {
     "certify odometer_rest": "did you mean 'odometer_reset'?",
     "list locomotve": "did you mean 'locomotive'?",
     "own.toml": "did you mean 'cosim run own.toml'?",
+    "run own.toml --stop 3": "no option --stop; did you mean --set stop=VALUE?",
+    "run own.toml --set observer=odometer_reset": "'observer' is a component; set one of its keys or parameters",
+    "new own.toml": "own.toml is a scenario; expected an .fmu file.",
+    "info folder": "folder is a folder; expected an .fmu file.",
+    "certify vendor.fmu": "vendor.fmu is an FMU; expected the name of an observer, or file.py:Class.",
+    "certify locomotive": "locomotive is a plant; expected the name of an observer, or file.py:Class.",
+    "linearise own.toml": "own.toml is a scenario; expected an .fmu file, or a plant or observer by name.",
+    "baseline make own.json own.toml": "own.json: expected what is run, an FMU or a scenario, and behind it FILE.json.",
+    "baseline check own.toml": "own.toml is a scenario; expected the .json of a baseline.",
+    "baseline check other.json": "There is no baseline other.json. That folder holds others; known: data.json.",
+    "sweep own.toml --vary step=0.1 --workers 0": "argument --workers: must be at least 1 (got 0)",
+    "sweep own.toml --vary step=0.1 --samples 0": "argument --samples: must be at least 1 (got 0)",
 }
 
 
