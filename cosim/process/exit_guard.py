@@ -11,7 +11,7 @@ import atexit
 import os
 import threading
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 
 from cosim.process.call_clock import CallClock
@@ -61,13 +61,15 @@ def _exit_called() -> None:
 
 
 @contextmanager
-def limited_calls(seconds: float | None) -> Iterator[None]:
+def limited_calls(seconds: float | None, *, ends: bool = False) -> Iterator[None]:
     """Within this context a call may last so long [s]; None for any time. A process that does not return is ended with
     code 2. Afterwards the limit of before holds.
 
     Args:
-        seconds: longest time a call may take [s]; None for any.
+        seconds: longest time a call may take [s]; None for any. ends: these are calls that end FMUs, before which
+            everything was written: where another process keeps the time, None stands for half a minute.
     """
+    seconds = _ENDING if seconds is None and ends and LAST_CALL.timed else seconds
     before, over = LAST_CALL.seconds_at_most, threading.Event()
     LAST_CALL.limit(seconds)
     if seconds is not None and not LAST_CALL.timed and not before:  # else somebody keeps the time already
@@ -77,16 +79,6 @@ def limited_calls(seconds: float | None) -> Iterator[None]:
     finally:
         over.set()
         LAST_CALL.limit(before)
-
-
-def limited_ends(seconds: float | None) -> AbstractContextManager[None]:
-    """As `limited_calls`, for the calls that end FMUs: where no limit is set, and another process keeps the time, one
-    of half a minute, since everything has been written by then.
-
-    Args:
-        seconds: longest time that a call may take in the run [s]; None for any.
-    """
-    return limited_calls(_ENDING if seconds is None and LAST_CALL.timed else seconds)
 
 
 def _keep_time(seconds: float, over: threading.Event) -> None:

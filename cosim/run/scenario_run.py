@@ -13,7 +13,7 @@ from time import perf_counter
 
 from cosim.components.component import Component
 from cosim.diagnostics.call_log import CallLog
-from cosim.process.exit_guard import limited_calls, limited_ends
+from cosim.process.exit_guard import limited_calls
 from cosim.process.interruption import Interruption
 from cosim.run.checked import check_task
 from cosim.run.executed import execute
@@ -57,7 +57,7 @@ def run_scenario(
     """
     master = task.table.master
     remarks = Remarks(warn or LOG.warning, list(warnings))
-    with limited_ends(master.call_timeout), ExitStack() as resources:
+    with limited_calls(master.call_timeout, ends=True), ExitStack() as resources:
         log = _open_log(call_log or CALL_LOG, resources) if master.log_calls else None
         with limited_calls(master.call_timeout):
             begin = perf_counter()

@@ -19,14 +19,14 @@ from typing import Any, NamedTuple
 
 FLOATS = "the rounding of floating-point numbers"
 PLACE = "the working directory"
-LOCALE = "the locale"
-INTERRUPT = "the response to Ctrl-C"
-STREAMS = "the standard streams"
+_LOCALE = "the locale"
+_INTERRUPT = "the response to Ctrl-C"
+_STREAMS = "the standard streams"
 ENVIRONMENT_BYTES = 256  # more than any fenv_t
 MXCSR_AT, _MXCSR_MODES = 28, 0xFFC0  # in glibc's fenv_t of x86-64: rounding, masks, flush to zero, denormals are zero
 EVERY = 64
 _ACTION_WORDS = 32  # more than any struct sigaction
-_INTERRUPT = int(signal.SIGINT)
+_SIGINT = int(signal.SIGINT)
 _OUTPUTS = (1, 2)
 
 
@@ -103,7 +103,7 @@ class _Streams:
         changed = [number for number, kept in self._kept.items() if _file(number) != _file(kept)]
         for number in changed:
             os.dup2(self._kept[number], number)
-        return [STREAMS] if changed else []
+        return [_STREAMS] if changed else []
 
     def __del__(self) -> None:
         for kept in self._kept.values():
@@ -139,22 +139,26 @@ class _Response:
     action: Any = field(compare=False)
 
 
+def _speak(name: str) -> None:
+    locale.setlocale(locale.LC_ALL, name)
+
+
 def _response() -> _Response | None:
     """What is done at SIGINT, which Python's own module does not know; None where that cannot be asked."""
     action, library = (ctypes.c_void_p * _ACTION_WORDS)(), _library()
-    if os.name != "posix" or library is None or library.sigaction(_INTERRUPT, None, action) != 0:
+    if os.name != "posix" or library is None or library.sigaction(_SIGINT, None, action) != 0:
         return None
     return _Response(action[0] or 0, action)
 
 
 def _respond(response: _Response) -> None:
-    _library().sigaction(_INTERRUPT, response.action, None)
+    _library().sigaction(_SIGINT, response.action, None)
 
 
 _ASPECTS = (
     _Aspect(PLACE, _here, os.chdir),
-    _Aspect(LOCALE, lambda: locale.setlocale(locale.LC_ALL), lambda name: str(locale.setlocale(locale.LC_ALL, name))),
-    _Aspect(INTERRUPT, _response, _respond),
+    _Aspect(_LOCALE, lambda: locale.setlocale(locale.LC_ALL), _speak),
+    _Aspect(_INTERRUPT, _response, _respond),
 )
 
 

@@ -157,7 +157,7 @@ def test_without_a_limit_of_calls_only_ends_have_one_where_somebody_keeps_the_ti
     monkeypatch.setattr(exit_guard, "LAST_CALL", page)
     seen: list[float] = []
     for page.timed in (True, False):
-        with exit_guard.limited_ends(None):
+        with exit_guard.limited_calls(None, ends=True):
             with exit_guard.limited_calls(None):
                 seen.append(page.seconds_at_most)
             seen.append(page.seconds_at_most)

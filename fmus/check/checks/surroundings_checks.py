@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fmus.check.check import LIMIT, Check
 from fmus.check.checks.instance_checks import open_files
-from fmus.check.checks.life_checks import by, listed
+from fmus.check.checks.life_checks import listed
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, failed, passed, skipped
 from fmus.check.runner import SLOW_STEPS, WARM_UP_STEPS
@@ -24,7 +24,9 @@ class SurroundingsCheck(
         with context.begun_runner() as runner:
             runner.steps_at_most(WARM_UP_STEPS)
         changed = context.surroundings.put_back()
-        return by(changed and f"it changed {' and '.join(changed)}", "it changes nothing that belongs to the process")
+        if changed:
+            return failed(f"it changed {' and '.join(changed)}")
+        return passed("it changes nothing that belongs to the process")
 
 
 class WrittenFilesCheck(
@@ -39,7 +41,9 @@ class WrittenFilesCheck(
         with context.begun_runner() as runner:
             runner.steps_at_most(WARM_UP_STEPS)
         new = sorted({entry.name for entry in Path(context.directory).iterdir()} - context.entries)
-        return by(new and f"it writes into the working directory: {listed(new)}", "it writes no file")
+        if new:
+            return failed(f"it writes into the working directory: {listed(new)}")
+        return passed("it writes no file")
 
 
 class OpenFilesCheck(Check, failing=LIMIT, advice="keep runs short: it opens a file in each step", place=27):
