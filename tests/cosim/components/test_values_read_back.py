@@ -78,3 +78,14 @@ def test_a_run_names_what_an_fmu_does_not_take(fmu: Path, deed: str, reported: s
     scenario = Scenario(stop=0.5, step=0.1, master={"stepper": stepper}).add("bad", fmu=str(fmu), parameters=parameters)
     warnings = [text for text in scenario.run().warnings if "does not take" in text]
     assert warnings == ([f"bad does not take what it is set: {reported}."] if reported else [])
+
+
+@pytest.mark.compiler
+def test_it_is_said_before_the_first_step_where_it_is_known_there(fmu: Path) -> None:
+    said: list[str] = []
+    parameters = {"deed": float(DEEDS.index("bounds")), "at": 0.4}
+    scenario = Scenario(stop=0.5, step=0.1, master={"stepper": "python"}).add(
+        "bad", fmu=str(fmu), parameters=parameters
+    )
+    scenario.run(warn=said.append, progress=lambda *_: said.append("a step"))
+    assert "does not take" in said[said.index("a step") - 1]
