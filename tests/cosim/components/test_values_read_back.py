@@ -88,4 +88,4 @@ def test_it_is_said_before_the_first_step_where_it_is_known_there(fmu: Path) -> 
         "bad", fmu=str(fmu), parameters=parameters
     )
     scenario.run(warn=said.append, progress=lambda *_: said.append("a step"))
-    assert "does not take" in said[said.index("a step") - 1]
+    assert any("does not take" in text for text in said[: said.index("a step")])
