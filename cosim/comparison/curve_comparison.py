@@ -218,7 +218,8 @@ def _remark(task: Task, points: Points, allowed: Allowed) -> str:
     error = float(np.max(np.abs(points.error[inside]), initial=0.0))
     if error <= max(_SMALL * spread, min(_ROUNDED * allowed.value, 0.5 * spread)):
         return ""
-    rows = len(values) - len(usual)
+    far = int(np.count_nonzero((values < low - share) | (values > high + share)))
+    rows = far or len(values) - len(usual)
     scale, rest, size, limit = (with_unit(v, task.unit) for v in (allowed.scale, share, error, allowed.value))
     return (
         f"{task.name}: {rows} of {len(values)} rows set its range of {scale}; the others have one of {rest} and differ "

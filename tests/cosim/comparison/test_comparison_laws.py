@@ -175,4 +175,5 @@ def test_a_range_that_a_few_rows_set_is_said(spike: float, sign: int, share: flo
     assert found.equal
     said = [note for note in found.notes if note.startswith("y: ")]
     assert bool(said) == (1e-3 * spike > np.std(small) and share > max(0.0071, min(1e-6 * spike, 0.36))), said
+    assert all(note.startswith("y: 4 of 1001 rows set its range of ") for note in said)
     assert not compared(reference, made(time, y=large + small + 1e-6 * small), Tolerance(relative=1e-3)).notes
