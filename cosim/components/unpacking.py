@@ -132,7 +132,7 @@ def _keep(digest: str, content: _Content) -> None:
 
 
 @atexit.register
-def forget_all() -> None:
+def _forget_all() -> None:
     """Remove what is kept, as at the end of the process."""
     if _owner[0] == os.getpid():
         while _contents:

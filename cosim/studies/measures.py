@@ -48,7 +48,7 @@ _DETECTION_UNITS = {
 
 def error_measures(outcome: Outcome) -> dict[str, float]:
     """Largest and root-mean-square errors of every observer over the evaluated part of the run, and what it made of
-    the odometer's faults (`detection_measures`).
+    the odometer's faults (`_detection_measures`).
 
     Args:
         outcome: the run.
@@ -77,7 +77,7 @@ def error_measures(outcome: Outcome) -> dict[str, float]:
             measures[f"{observer}.{quantity}_error_rms"] = nan if failed else size.rms
     if outcome.expectations and outcome.failure is None:
         measures[UNMET] = float(len(outcome.unmet))
-    return measures | detection_measures(outcome) | _gap_measures(outcome) | _consistency_measures(outcome)
+    return measures | _detection_measures(outcome) | _gap_measures(outcome) | _consistency_measures(outcome)
 
 
 def _consistency_measures(outcome: Outcome) -> dict[str, float]:
@@ -98,7 +98,7 @@ def _consistency_measures(outcome: Outcome) -> dict[str, float]:
     return measures
 
 
-def detection_measures(outcome: Outcome) -> dict[str, float]:
+def _detection_measures(outcome: Outcome) -> dict[str, float]:
     """What every observer made of the faults of the odometer, where the report has the role `true_fault`.
 
     Args:
@@ -194,7 +194,7 @@ def with_unit(name: str, unit: str | None) -> str:
 
 
 def measure_unit(name: str) -> str | None:
-    """SI unit of a measure of `error_measures` or `detection_measures`; None for the user's own.
+    """SI unit of a measure of `error_measures` or `_detection_measures`; None for the user's own.
 
     Args:
         name: of the measure.

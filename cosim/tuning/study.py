@@ -81,7 +81,7 @@ class Study:
         better = dict(winner.best) if winner.costs[-1] < before.mean() else None
         validated = self._validated(better, before.tolist(), () if interrupted else self.validation)
         at_best = None if interrupted or better is None else self._directions(better)
-        remarks = [_NOTHING_BETTER] if better is None else at_bounds(self.asked.space, better, why)
+        remarks = [_NOTHING_BETTER] if better is None else _at_bounds(self.asked.space, better, why)
         return Tuning(
             scenario=self._tuned(better),
             method=self.method,
@@ -239,7 +239,7 @@ class _Bar:
             self._progress(self._done, max(self._total, self._done), self.text)
 
 
-def at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, str]) -> list[str]:
+def _at_bounds(space: SearchSpace, best: Mapping[str, float], held: Mapping[str, str]) -> list[str]:
     """What is said of values that a search left at the end of their range.
 
     Args:

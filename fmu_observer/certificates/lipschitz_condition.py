@@ -34,7 +34,7 @@ class ThauBound:
         return self.lipschitz < self.valid
 
 
-def thau_bound(closed: np.ndarray) -> tuple[float, float]:
+def _thau_bound(closed: np.ndarray) -> tuple[float, float]:
     """The valid and the printed bound of Bouchama 2024, (1.8), Theorem 1, at Q = I, which gives the best valid one.
 
     The derivative of ``e' P e`` is at most ``(-lmin(Q) + 2 alpha lmax(P)) |e|^2``, so ``alpha < lmin(Q) / (2 lmax(P))``
@@ -54,8 +54,8 @@ def thau_bound(closed: np.ndarray) -> tuple[float, float]:
 
 
 def scaled_thau_bound(model: ObserverModel, gain: np.ndarray, scale: float = 1.0) -> ThauBound:
-    """`thau_bound` of a model with a gain L of shape (n, q), in the coordinates of one scale."""
-    valid, printed = thau_bound(scaled(model.A - gain @ model.C, scale))
+    """`_thau_bound` of a model with a gain L of shape (n, q), in the coordinates of one scale."""
+    valid, printed = _thau_bound(scaled(model.A - gain @ model.C, scale))
     return ThauBound(valid, printed, scale, scaled_lipschitz(model, scale))
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from own_condition import own_condition
 from scipy.linalg import expm
 
-from fmu_observer.certificates.lipschitz_condition import best_thau_bound, thau_bound
+from fmu_observer.certificates.lipschitz_condition import _thau_bound, best_thau_bound
 from fmu_observer.certificates.printed_bounds.high_gain_theta import (
     binomial_gain,
     lyapunov_size,
@@ -96,7 +96,7 @@ def test_a_gain_of_another_size_is_refused() -> None:
 def test_the_valid_and_the_printed_bound() -> None:
     """By hand: P = [[5/8, -1/2], [-1/2, 21/32]]. The independently measured numbers are 0.438 and 7.12."""
     middle, radius = 41.0 / 64.0, np.hypot(1.0 / 64.0, 0.5)
-    assert thau_bound(CLOSED) == pytest.approx((0.5 / (middle + radius), 1.0 / (middle - radius)), rel=1e-12)
+    assert _thau_bound(CLOSED) == pytest.approx((0.5 / (middle + radius), 1.0 / (middle - radius)), rel=1e-12)
     values = own_condition(Thau()).numbers
     assert values["bound"] == pytest.approx(0.438, abs=5e-4)
     assert values["printed_bound"] == pytest.approx(7.12, abs=5e-3)
@@ -107,13 +107,13 @@ def test_the_valid_and_the_printed_bound() -> None:
 @given(st.integers(0, 10_000))
 def test_no_perturbation_below_the_valid_bound_destabilises(seed: int) -> None:
     perturbation = np.random.default_rng(seed).normal(size=(2, 2))
-    perturbation *= 0.999 * thau_bound(CLOSED)[0] / np.linalg.norm(perturbation, 2)
+    perturbation *= 0.999 * _thau_bound(CLOSED)[0] / np.linalg.norm(perturbation, 2)
     assert np.linalg.eigvals(CLOSED + perturbation).real.max() < 0.0
 
 
 def test_a_perturbation_far_below_the_printed_bound_destabilises() -> None:
     perturbation = np.array([[0.0, 0.0], [4.1, 0.0]])
-    assert np.linalg.norm(perturbation, 2) < 0.6 * thau_bound(CLOSED)[1]
+    assert np.linalg.norm(perturbation, 2) < 0.6 * _thau_bound(CLOSED)[1]
     assert np.linalg.eigvals(CLOSED + perturbation).real.max() > 0.0
 
 
@@ -135,7 +135,7 @@ def test_scaled_coordinates_prove_the_pendulum_and_the_error_decays_everywhere()
 
 
 def test_thau_needs_a_hurwitz_matrix() -> None:
-    assert thau_bound(CHAIN) == (0.0, 0.0)
+    assert _thau_bound(CHAIN) == (0.0, 0.0)
     assert not own_condition(Thau(), {"gain": [0.0, 0.0]}).holds
 
 

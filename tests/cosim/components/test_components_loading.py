@@ -17,7 +17,7 @@ from cosim.cli import main as cosim_main
 from cosim.components import unpacking
 from cosim.components.description import read_description
 from cosim.components.loading import load_fmu
-from cosim.components.unpacking import forget_all
+from cosim.components.unpacking import _forget_all
 from cosim.errors import FmuLoadError
 from cosim.starter.inspected_fmu import inspect_fmu
 from fmus.cli import main as fmus_main
@@ -53,7 +53,7 @@ def _nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(tempfile, "tempdir", str(scratch))
     here = Path.cwd()
     yield
-    forget_all()  # as at the end of a process
+    _forget_all()  # as at the end of a process
     assert list(scratch.iterdir()) == []
     assert Path.cwd() == here
 

@@ -144,7 +144,7 @@ def test_few_contents_are_kept_and_none_at_the_end(tmp_path: Path, monkeypatch: 
         path = make_fmu(tmp_path / f"{number}.fmu", **{"resources/table.csv": str(number)})
         shutil.rmtree(unpack(read_archive(path)))
     assert len(temporary()) == 2
-    unpacking.forget_all()
+    unpacking._forget_all()
     assert temporary() == []
 
 
@@ -153,6 +153,6 @@ def test_a_copied_process_leaves_the_folders_to_the_other(tmp_path: Path, monkey
     shutil.rmtree(unpack(read_archive(path)))
     kept = temporary()
     monkeypatch.setattr(unpacking.os, "getpid", lambda: -1)
-    unpacking.forget_all()
+    unpacking._forget_all()
     read_archive(path)
     assert temporary() == kept

@@ -24,7 +24,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.report.figures.fault_figure import BoundsPanel, FaultsPanel
 from cosim.results.result import BaliseRecord, Result
 from cosim.run.outcome import Outcome
-from cosim.studies.measures import detection_measures, measure_unit
+from cosim.studies.measures import _detection_measures, measure_unit
 
 SPEC = ReportSpec(true_position="train.position", true_fault="wheel.active", observers=["o", "alone"])
 
@@ -150,7 +150,7 @@ def test_clopper_pearson_is_that_of_scipy(count: int, trials: int) -> None:
 
 
 def test_they_are_measures_of_a_sweep() -> None:
-    measures = detection_measures(Outcome(made([(10.0, 13.0)], [(10.4, 13.2)]), SPEC))
+    measures = _detection_measures(Outcome(made([(10.0, 13.0)], [(10.4, 13.2)]), SPEC))
     assert measures["o.missed_faults"] == measures["o.false_alarms"] == 0.0
     assert measures["o.detection_delay"] == pytest.approx(0.4)
     assert measures["alone.balise_error"] == pytest.approx(3.0)

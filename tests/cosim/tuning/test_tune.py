@@ -25,7 +25,7 @@ from cosim.tuning.evaluation import Evaluator
 from cosim.tuning.parameters import tunable
 from cosim.tuning.replays import Replays
 from cosim.tuning.slopes import LikelihoodSlopes, NoSlopesError
-from cosim.tuning.study import at_bounds
+from cosim.tuning.study import _at_bounds
 from cosim.tuning.tune import tune
 from cosim.tuning.tuning_page import tuning_page
 from cosim.tuning.tuning_result import Tuning
@@ -336,9 +336,9 @@ def test_what_cannot_be_is_reported_before_a_search(changes: dict[str, Any], wor
 
 def test_values_at_the_end_of_their_range_are_reported() -> None:
     space = SearchSpace([Bounded("q", 1e-6, 1.0, True), Bounded("r", 0.0, 2.0), Bounded("held", 0.0, 1.0)])
-    reported = at_bounds(space, {"q": 1e-6, "r": 1.0, "held": 0.0}, {"held": "it changes nothing"})
+    reported = _at_bounds(space, {"q": 1e-6, "r": 1.0, "held": 0.0}, {"held": "it changes nothing"})
     assert [text.partition(":")[0] for text in reported] == ["q ends at its lower bound, 1e-06"]
-    assert "r ends at its upper bound, 2" in at_bounds(space, {"q": 0.1, "r": 2.0, "held": 0.0}, {"held": ""})[0]
+    assert "r ends at its upper bound, 2" in _at_bounds(space, {"q": 0.1, "r": 2.0, "held": 0.0}, {"held": ""})[0]
 
 
 def test_a_search_that_is_not_resumed_keeps_the_one_before(tmp_path: Path) -> None:
