@@ -68,7 +68,7 @@ def execute(options: argparse.Namespace) -> Output:
         if options.output is not None:
             options.output.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     except OSError as error:  # the report is shown all the same
-        failure = error
+        failure = OSError(f"{options.output} cannot be written: {error.strerror or error}.")
     code = _exit_code(report, options.strict)
     verdict = f"Verdict: {report.verdict} ({_counts(report)}, {report.seconds:.1f} s)"
     role: Role = "good" if report.clean else "doubtful" if code == CLEAN else "bad"

@@ -80,7 +80,7 @@ def test_json_in_place_of_the_table(honest: Path, capsys: Output) -> None:
         (["--timeout", "-1"], "must be positive and finite"),
         (["--steps", "0"], "must have a step at least"),
         (["--until", "0"], "must lie after the start"),
-        (["-o", "no/such/folder/report.json"], "no/such/folder/report.json"),
+        (["-o", "no/such/folder/report.json"], "no/such/folder/report.json cannot be written: No such file"),
     ],
 )
 def test_mistakes_end_with_two_and_advice(arguments: list[str], words: str, honest: Path, capsys: Output) -> None:
