@@ -64,12 +64,19 @@ class HermiteStep:
         return self.v0 * self.v1 < 0.0
 
     def may_stand(self, acceleration: float) -> bool:
-        """Whether a train that accelerates or brakes no harder than this [m/s2] can stand or turn within the step."""
+        """Whether a train can stand or turn within the step.
+
+        Args:
+            acceleration: harder than which it neither accelerates nor brakes [m/s2].
+        """
         return abs(self.v0 + self.v1) <= acceleration * self.h
 
     def reach(self, acceleration: float) -> tuple[float, float]:
-        """Lowest and highest position [m] within the step of a train that accelerates or brakes no harder than this
-        [m/s2]: it is between the parabolas of the hardest motion from the one end and to the other.
+        """Lowest and highest position [m] that a train can have within the step: it is between the parabolas of the
+        hardest motion from the one end and to the other.
+
+        Args:
+            acceleration: as of `may_stand`.
         """
         places = [self.p0, self.p1]
         for a in (-acceleration, acceleration):
