@@ -6,6 +6,9 @@ is searched for by Newton's method on the values that are fed back; setting inpu
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 
 from cosim.coupling.plan import Plan
@@ -13,6 +16,7 @@ from cosim.errors import RunError
 from cosim.master.algorithms.acceleration import Newton
 from cosim.master.algorithms.history import shown
 from cosim.master.algorithms.links import interface, plan_links
+from cosim.master.exchange import ExchangeAtInstant, exchange_in_initialization
 
 MAX_ROUNDS = 100
 _PLAIN_ROUNDS = (10, 30)
@@ -52,9 +56,10 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     settling = _Settling(plan)
     changing = settling.run()
     if changing:
-        raise _unsettled(plan, changing, settling.residuals, start_time)
+        raise _changes_when_read(plan, start_time) or _unsettled(plan, changing, settling.residuals, start_time)
     _leave_initialization(plan)
     rounds = settling.rounds
+    settling.exchange = ExchangeAtInstant(plan)
     if settling.exchange_changes_feedback():
         settling.run()
     plan.begin_step()
@@ -79,12 +84,13 @@ def _leave_initialization(plan: Plan) -> None:
 class _Settling:
     """Exchanges until nothing changes.
 
-    After `run`, `rounds` says how many it took and `residuals` by how much what is fed back changed in each, as a share
-    of its first size.
+    Exchanges as `exchange` does, which is set anew when Initialization Mode ends. After `run`, `rounds` says how many
+    it took and `residuals` by how much what is fed back changed in each, as a share of its first size.
     """
 
     def __init__(self, plan: Plan) -> None:
         self.plan, self.rounds = plan, 0
+        self.exchange: Callable[[], None] = partial(exchange_in_initialization, plan)
         self.residuals: list[float] = []
         self._columns = interface(plan_links(plan))
         self._jumps = ~plan.continuous[self._columns]
@@ -101,7 +107,7 @@ class _Settling:
             self._newton.begin(self._size)
         for self.rounds in range(1, MAX_ROUNDS + 1):
             previous = values.copy()
-            _exchange(self.plan)
+            self.exchange()
             changed = self._changed(previous)
             if not changed.any() and self.rounds > 1:
                 return []
@@ -115,7 +121,7 @@ class _Settling:
     def exchange_changes_feedback(self) -> bool:
         """Exchange once; whether anything that is fed back was still changed by it."""
         previous = self.plan.values.copy()
-        _exchange(self.plan)
+        self.exchange()
         return bool(self._changed(previous, _JUMP)[self._columns].any())
 
     def _changed(self, previous: np.ndarray, tolerance: float = TOLERANCE) -> np.ndarray:
@@ -167,9 +173,20 @@ def _unsettled(plan: Plan, changing: list[int], residuals: list[float], start_ti
     return RunError(reason, names[0].partition(".")[0], start_time)
 
 
-def _exchange(plan: Plan) -> None:
+def _changes_when_read(plan: Plan, start_time: float) -> RunError | None:
+    """What to say of an output that two reads give two values of, with nothing set in between; None where all agree."""
     for step in plan.steps:
-        step.write()
         step.read()
-    for relay in plan.relays:
-        relay()
+        first = step.outputs.copy()
+        step.read()
+        changed = np.flatnonzero((first != step.outputs) & ~(np.isnan(first) & np.isnan(step.outputs)))
+        if changed.size:
+            place, component = int(changed[0]), step.component.name
+            reason = (
+                f"Component '{component}' at t = {start_time:g} s: output {plan.signals[step.columns][place].name} has "
+                f"another value each time it is read: {first[place]:.9g}, then {step.outputs[place]:.9g}, at one "
+                "instant and with nothing set in between. No order of exchange settles that. Ask whoever made the "
+                "component for one whose outputs change only with its inputs and its steps."
+            )
+            return RunError(reason, component, start_time)
+    return None

@@ -11,7 +11,10 @@ from mock_slaves import Counter, Mock, component
 from scipy.optimize import brentq
 
 from cosim.errors import RunError
-from cosim.master.initialisation import MAX_ROUNDS
+from cosim.master.algorithms.gauss_seidel import GaussSeidel
+from cosim.master.algorithms.jacobi import Jacobi
+from cosim.master.exchange import ExchangeAtInstant
+from cosim.master.initialisation import MAX_ROUNDS, initialise
 from plant_models.hybrid import HybridSystem, PeriodicEvent
 from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, state
 
@@ -147,6 +150,8 @@ def test_a_loop_that_jumps_when_initialisation_ends_settles_again() -> None:
     """``y = -4 u + x``, and x becomes 1 on leaving Initialization Mode: the first row holds 1/5."""
 
     class Jumps(Gain):
+        feedthrough: ClassVar[dict[str, list[str]]] = {"y": ["u"]}
+
         def begin(self) -> None:
             self.x = {"x": 0.0}
 
@@ -171,6 +176,100 @@ def test_an_exchange_that_does_not_settle_names_the_signals() -> None:
     assert "Relative changes of what is fed back: " in str(error.value)
     assert error.value.time == 2.0
     assert master.recorder.count == 0
+
+
+def test_an_output_that_changes_with_every_read_is_named_with_two_values() -> None:
+    """Nothing is fed back here, and no start value helps."""
+
+    class Restless(Mock):
+        outputs: ClassVar[dict[str, Any]] = {"calm": 0.0, "y": 0.0}
+
+        def compute(self) -> None:
+            self.v["y"] += 0.25
+
+    master = prepare([component(Counter(), "calm"), component(Restless(), "odd")], [], 0.1, 3)
+    with pytest.raises(RunError, match=r"'odd' at t = 0 s: output odd\.y has another value .* read: [\d.]+, then") as e:
+        master.run()
+    values = str(e.value).partition("read: ")[2].partition(", at one instant")[0]
+    first, second = map(float, values.split(", then "))
+    assert second == first + 0.25
+    assert "fed back" not in str(e.value)
+
+
+class Strict(Mock):
+    """``x' = u - x``; refuses to be read between a set and the next step, as FMI 2.0 allows. Becomes 1 as it starts."""
+
+    inputs: ClassVar[dict[str, Any]] = {"u": 0.0}
+    outputs: ClassVar[dict[str, Any]] = {"y": 0.0}
+    memory = ("v", "x", "time", "stepping", "unread")
+
+    def begin(self) -> None:
+        self.x, self.stepping, self.unread = {"x": 0.0}, False, False
+
+    def exitInitializationMode(self) -> None:
+        self.x, self.stepping, self.unread = {"x": 1.0}, True, False
+
+    def compute(self) -> None:
+        assert not self.unread, "get after set without a step"
+        self.v["y"] = self.x["x"]
+
+    def _set(self, *arguments: Any) -> None:
+        super()._set(*arguments)
+        self.unread = self.stepping
+
+    setFloat64 = _set
+
+    def move(self, t: float, h: float) -> None:
+        self.unread = False
+        self.x = {"x": self.x["x"] + h * (self.v["u"] - self.x["x"])}
+
+
+class Lenient(Strict):
+    """The same, readable at any time."""
+
+    def _set(self, *arguments: Any) -> None:
+        super()._set(*arguments)
+        self.unread = False
+
+    setFloat64 = _set
+
+
+@pytest.mark.parametrize("algorithm", [GaussSeidel, Jacobi])
+@pytest.mark.parametrize("names", [("a", "b"), ("b", "a")])
+def test_what_no_input_acts_on_at_once_is_not_read_after_it_was_set(algorithm: Any, names: tuple[str, str]) -> None:
+    """Both start with a jump, so that what is fed back has to be passed on; same numbers as where all may be read."""
+    pairs = [("a.y", "b.u"), ("b.y", "a.u")]
+    strict, lenient = (
+        run([component(kind(), name) for name in names], pairs, 0.1, 5, algorithm=algorithm)
+        for kind in (Strict, Lenient)
+    )
+    assert strict["a.y"][0] == 1.0
+    for name in names:
+        assert strict[f"{name}.y"].tolist() == lenient[f"{name}.y"].tolist()
+        assert len(strict[f"{name}.y"]) == 6
+
+
+def test_what_its_inputs_act_on_is_not_read_again_where_they_stayed_as_they_were() -> None:
+    """Direct feedthrough that is declared; its source jumped as initialisation ended, before its own ended."""
+
+    class Feeding(Strict):
+        feedthrough: ClassVar[dict[str, list[str]]] = {"y": ["u"]}
+
+        def compute(self) -> None:
+            super().compute()
+            self.v["y"] = self.v["u"] + 1.0
+
+    ran = run([component(Strict(), "a"), component(Feeding(), "b")], [("a.y", "b.u")], 0.1, 3)
+    assert ran["b.y"][0] == 2.0
+
+
+def test_a_value_that_was_tried_for_what_is_fed_back_does_not_stay_where_nothing_is_read() -> None:
+    plan = prepare([component(Strict(), "a"), component(Strict(), "b")], [("a.y", "b.u"), ("b.y", "a.u")], 0.1, 1).plan
+    initialise(plan, 0.0, 0.1)
+    exchange = ExchangeAtInstant(plan)
+    plan.values[:] = 99.0
+    exchange()
+    assert plan.values.tolist() == [1.0, 1.0]
 
 
 def test_infinite_and_missing_values_do_not_hide_as_unsettled() -> None:

@@ -1,0 +1,65 @@
+"""An exchange of inputs and outputs between all components at one instant, in Initialization Mode and after it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cosim.coupling.feedthrough import declared_feedthrough
+from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
+
+
+def exchange_in_initialization(plan: Plan) -> None:
+    """Exchange once in Initialization Mode, where every output may have changed with every input.
+
+    Args:
+        plan: of the run.
+    """
+    for step in plan.steps:
+        step.write()
+        step.read()
+    for relay in plan.relays:
+        relay()
+
+
+class ExchangeAtInstant:
+    """Exchanges after Initialization Mode, without a step between them; made where all outputs have just been read.
+
+    An FMU may refuse fmi2Get after fmi2Set until its next step (FMI 2.0.4, 4.2.4). So outputs are read again only where
+    an input that acts on them at once has another value than before; otherwise they are what they were.
+
+    Args:
+        plan: all components in step mode, their inputs sent and their outputs read.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        self._acted_on = [_acted_on_at_once(plan, step) for step in plan.steps]
+        self._read = [step.outputs.copy() for step in plan.steps]
+
+    def __call__(self) -> None:
+        """Exchange once."""
+        for step, acted_on, known in zip(self._plan.steps, self._acted_on, self._read, strict=True):
+            sent = step.inputs.buffer.copy()
+            step.write()
+            if acted_on and not _is_equal(step, sent):
+                step.read()
+                known[:] = step.outputs
+            else:
+                step.outputs[:] = known  # a search for what is fed back may have tried other values
+        for relay in self._plan.relays:
+            relay()
+
+
+def _is_equal(step: PlannedComponent, sent: np.ndarray) -> bool:
+    return step.inputs.non_numeric is None and np.array_equal(step.inputs.buffer, sent, equal_nan=True)
+
+
+def _acted_on_at_once(plan: Plan, step: PlannedComponent) -> bool:
+    """Whether a connected input may act at once on anything that is read: what is not declared may."""
+    component, declared = step.component, declared_feedthrough(step.component)
+    connected = {c.target_variable[1] for c in plan.connections if c.target[0] == component.name}
+    read = {signal.name.partition(".")[2] for signal in plan.signals[step.columns]}
+    read |= {c.source_variable[1] for c in plan.connections if c.source[0] == component.name}
+    variables = {name if name in component.variables else name.partition("[")[0] for name in read}
+    return any(name not in declared or not connected.isdisjoint(declared[name]) for name in variables)
