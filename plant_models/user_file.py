@@ -106,9 +106,8 @@ def load_class(name: str, expected: Expected, folder: Path | str = ".") -> Any:
     others = {wanted: found} if wanted else {key: value for key, value in own.items() if not fitting}
     named = ", ".join(f"{key} is {_kind(value)}" for key, value in others.items() if value is not None)
     what = f" ({named})" if named else ""
-    named_one = f" named {wanted!r}" if wanted else ""
     raise UserFileError(
-        f"{path} has no {expected.noun}{named_one}{what}; it has: {', '.join(fitting) or 'none'}."
+        f"{path} has no {expected.noun}{wanted and f' named {wanted!r}'}{what}; it has: {', '.join(fitting) or 'none'}."
         + (f" Write {path}:Class." if fitting else "")
     )
 

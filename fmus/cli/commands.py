@@ -208,11 +208,8 @@ class CommandProgram:
         Returns:
             The exit code: that of the command, 2 for an error or an interruption, 141 where nobody reads any more.
         """
-        if not words:
-            print(self.first_screen())
-            return _DONE
-        if words[0] == _COMPLETION:
-            print(self.completion(" ".join(words[1:]) or "bash"), end="")
+        if not words or words[0] == _COMPLETION:
+            print(self.completion(" ".join(words[1:]) or "bash") if words else self.first_screen())
             return _DONE
         options = argparse.Namespace(command_line=shlex.join([self.name, *words]))
         try:  # reading the words loads the command, which may be interrupted too

@@ -95,4 +95,4 @@ def test_a_shell_that_is_not_known_is_named(capsys: pytest.CaptureFixture[str]) 
 @pytest.mark.parametrize("shell", SHELLS)
 def test_the_script_is_printed(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert COSIM.run(["--completion", shell]) == 0
-    assert capsys.readouterr().out == COSIM.completion(shell)
+    assert capsys.readouterr().out == f"{COSIM.completion(shell)}\n"
