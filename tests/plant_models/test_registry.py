@@ -115,7 +115,7 @@ FAULTS = {
     "leaves.py:Bias": ("import sys\nsys.exit('bye')\n", r"cannot be run: SystemExit: bye \(.*leaves.py:2\)"),
     "number.py:Bias": ("Bias = 3.0\n", r"named 'Bias' \(Bias is of type float\)"),
     "bare.py:Bias": ("class Bias:\n    pass\n", r"named 'Bias' \(Bias is a class without a base\)"),
-    "no_base.py": ("class Bias:\n    name = 'bias'\n", r"named '' \(Bias is a class without a base\)"),
+    "no_base.py": ("class Bias:\n    name = 'bias'\n", r"dt\) \(Bias is a class without a base\)"),
     "other_base.py:Bias": ("class Bias(dict):\n    pass\n", r"named 'Bias' \(Bias is a class of base dict\)"),
     "misspelt.py:Bias": (
         "from plant_models.hybrid import HybridSystem\nclass Bias(HybridSytem):\n    name = 'bias'\n",
