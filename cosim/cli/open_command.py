@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cosim.errors import CosimError, OutputError
 from cosim.evaluation.stored_spec import spec_of
-from cosim.report.page.run_page import write_report, write_report_page
+from cosim.report.page.run_page import is_page_of, write_report, write_report_page
 from cosim.results.load_result import load_result
 from cosim.results.results_folder import REPORT, SUMMARY
 from fmus.cli.commands import argument
@@ -28,8 +28,8 @@ EXAMPLES = (
 PARSER = {
     "description": (
         "Open the page of a results folder, of a sweep, a tuning or a comparison in the browser; of a run it is made "
-        "where there is none yet, or where it is older than the results. A table in any format that can be read gets a "
-        "page of its own."
+        "where there is none yet, or where it was made of other results than are there now. A table in any format that "
+        "can be read gets a page of its own."
     ),
     "epilog": "Exit codes: 0 opened, 1 written, but no browser opens it, 2 error.",
 }
@@ -59,7 +59,7 @@ def _page(path: Path, out: str | None) -> Path:
         return path
     if path.is_dir() and out is None:
         found = next((path / name for name in PAGES if (path / name).is_file()), None)
-        if found is not None and not _is_older(found, path / SUMMARY):
+        if found is not None and not _is_of_others(found, path):
             return found
     result = load_result(path)
     spec = spec_of(result, path.stem)
@@ -73,11 +73,11 @@ def _page(path: Path, out: str | None) -> Path:
     return write_report_page(result, spec, Path(tempfile.mkdtemp(prefix="cosim-")) / f"{path.stem}.html")
 
 
-def _is_older(page: Path, results: Path) -> bool:
-    """Whether the results were written after the page."""
-    try:
-        return results.stat().st_mtime > page.stat().st_mtime
-    except OSError as error:
-        if results.exists():
-            raise CosimError(f"{results} cannot be read: {error.strerror or error}.") from error
+def _is_of_others(page: Path, folder: Path) -> bool:
+    """Whether the page of a run was made of other results than those in its folder now."""
+    if page.name != REPORT or not (folder / SUMMARY).is_file():
         return False
+    try:
+        return not is_page_of(page, folder)
+    except OSError as error:
+        raise CosimError(f"{error.filename or folder} cannot be read: {error.strerror or error}.") from error

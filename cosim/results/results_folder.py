@@ -6,6 +6,7 @@ or a stopped program leaves the former files whole.
 
 from __future__ import annotations
 
+import hashlib
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -41,6 +42,25 @@ def remove_report(directory: str | Path, keep: Collection[Path] = ()) -> None:
     for picture in (folder / FIGURES).glob("*.*"):
         if picture.suffix in (".png", ".svg") and picture not in keep:
             picture.unlink(missing_ok=True)
+
+
+def results_digest(directory: str | Path) -> str:
+    """What distinguishes the results in a folder from others, whatever the dates of the files: a hash of their names
+    and contents.
+
+    Args:
+        directory: the results folder.
+
+    Raises:
+        OSError: a file cannot be read.
+    """
+    whole = hashlib.sha256()
+    for name in sorted((*table_files().values(), EVENTS, MESSAGES, PACKETS, SUMMARY)):
+        path = Path(directory) / name
+        if path.is_file():
+            with path.open("rb") as file:
+                whole.update(f"{name} {hashlib.file_digest(file, 'sha256').hexdigest()}\n".encode())
+    return whole.hexdigest()
 
 
 def check_writable(directory: str | Path, formats: Sequence[str] = ()) -> Path:

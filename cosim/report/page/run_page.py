@@ -20,11 +20,12 @@ from cosim.report.page.run_sections import run_sections
 from cosim.report.page.run_statements import run_statements
 from cosim.report.page.run_verdict import largest_finding, observer_statuses, run_verdict
 from cosim.results.result import Result
-from cosim.results.results_folder import FIGURES, REPORT, remove_report
+from cosim.results.results_folder import FIGURES, REPORT, remove_report, results_digest
 
 
 def write_report(result: Result, spec: ReportSpec, directory: str | Path, *, figures: Pictures = False) -> Path:
-    """Write ``report.html``, and where they are asked for its figures as files in ``figures/``.
+    """Write ``report.html``, and where they are asked for its figures as files in ``figures/``. The page notes of which
+    results in the folder it was made, see `is_page_of`.
 
     Args:
         result: the run; a failed one is reported as far as it came.
@@ -44,8 +45,25 @@ def write_report(result: Result, spec: ReportSpec, directory: str | Path, *, fig
     files = _drawn(result, spec, kind) if figures else {}
     with explained(f"The report cannot be written to {folder}", "Choose another output folder."):
         remove_report(folder, keep=write_pictures(files, folder / FIGURES, kind).values())
-        write_file(folder / REPORT, page_bytes(text))
+        write_file(folder / REPORT, page_bytes(text) + _made_of(folder))
     return folder / REPORT
+
+
+def is_page_of(page: Path, directory: Path) -> bool:
+    """Whether a page was made of the very results in a folder.
+
+    Args:
+        page: the file. directory: the results folder.
+
+    Raises:
+        OSError: a file cannot be read.
+    """
+    return page.read_bytes().endswith(_made_of(directory))
+
+
+def _made_of(directory: Path) -> bytes:
+    """The end of the page of these results: a comment, which shows nowhere."""
+    return f"\n<!-- made of results with SHA-256 {results_digest(directory)} -->\n".encode()
 
 
 def _drawn(result: Result, spec: ReportSpec, kind: PictureKind) -> dict[str, bytes]:

@@ -27,18 +27,34 @@ def results(tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
-def test_a_page_is_made_once_and_again_when_the_results_are_newer(results: Path, opened: list[str]) -> None:
+@pytest.mark.parametrize("dates", [(0, 0), (2**31, 2**31)])
+@pytest.mark.parametrize("name", ["table.csv", "summary.json", "events.csv"])
+def test_a_page_is_made_once_and_again_when_the_results_are_others(
+    results: Path, opened: list[str], name: str, dates: tuple[int, int]
+) -> None:
+    """Whatever the dates of the files: results that were copied over older ones keep theirs."""
     page = results / REPORT
     assert main(["open", str(results)]) == 0
     assert opened == [page.resolve().as_uri()]
-    page.write_text("kept", encoding="utf-8")
+    page.write_bytes(page.read_bytes().replace(b"live-data", b"kept"))
+    for path in results.iterdir():
+        os.utime(path, dates)
     assert main(["open", str(results)]) == 0
-    assert page.read_text(encoding="utf-8") == "kept"
-    os.utime(page, (0, 0))
+    assert "live-data" not in page.read_text(encoding="utf-8")  # the same results
+    path = results / name
+    path.write_text(path.read_text(encoding="utf-8").replace("0.0", "0.00", 1), encoding="utf-8")
+    os.utime(path, (0, 0))
     assert main(["open", str(results)]) == 0
     assert "live-data" in page.read_text(encoding="utf-8")
     assert main(["open", str(page)]) == 0
     assert len(opened) == 4
+
+
+def test_a_page_that_does_not_say_what_it_was_made_of_is_made_anew(results: Path, opened: list[str]) -> None:
+    (results / REPORT).write_text("of a former version", encoding="utf-8")
+    assert main(["open", str(results)]) == 0
+    assert "live-data" in (results / REPORT).read_text(encoding="utf-8")
+    assert len(opened) == 1
 
 
 def test_a_table_and_a_place_that_is_named(results: Path, opened: list[str], tmp_path: Path) -> None:
