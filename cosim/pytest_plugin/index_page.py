@@ -10,6 +10,7 @@ import pytest
 
 from cosim.pytest_plugin import options
 from cosim.pytest_plugin.records import AS_BEFORE, HEADLINES, RegressionRecord, verdict
+from fmus.tables.table import Table, name_column, text_column
 
 NAME = "index.html"
 
@@ -40,7 +41,6 @@ def written(records: Sequence[RegressionRecord], config: pytest.Config) -> list[
 def _page(records: Sequence[RegressionRecord], folder: Path, root: Path) -> str:
     from cosim.report.live.live_page import LivePage, PageVerdict, Rows, Section  # noqa: PLC0415 - where a page is written
     from cosim.report.live.render import live_page  # noqa: PLC0415
-    from fmus.tables.table import Table, name_column, text_column  # noqa: PLC0415
 
     columns = (
         name_column("test", "Test"),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from cosim.drawing.style import OBSERVER_LINES, axes_or_new, styled
+from cosim.drawing.style import OBSERVER_LINES, axes_or_new, picture, styled
 
 if TYPE_CHECKING:
     from cosim.tuning.tuning_result import Tuning
@@ -33,3 +33,12 @@ def convergence_figure(tuning: Tuning) -> Figure:
     figure = ax.get_figure(root=True)
     assert isinstance(figure, Figure)
     return figure
+
+
+def draw_convergence(tuning: Tuning, kind: str) -> dict[str, bytes]:
+    """The picture as a file, by the stem of its name.
+
+    Args:
+        tuning: what was found. kind: of file, ``png`` or ``svg``.
+    """
+    return {"convergence": picture(convergence_figure(tuning), kind)}

@@ -66,12 +66,10 @@ def write_figures(tuning: Tuning, directory: Path, figures: Pictures) -> dict[st
     """
     if not figures:
         return {}
-    from cosim.drawing.style import picture  # noqa: PLC0415 - matplotlib only for those who draw
-    from cosim.tuning.tuning_drawing import convergence_figure  # noqa: PLC0415 - likewise
+    from cosim.tuning.tuning_drawing import draw_convergence  # noqa: PLC0415 - matplotlib only for those who draw
 
     kind = picture_kind(figures)
-    drawn = {"convergence": picture(convergence_figure(tuning), kind)}
-    return write_pictures(drawn, directory / FIGURES, kind, "convergence")
+    return write_pictures(draw_convergence(tuning, kind), directory / FIGURES, kind, "convergence")
 
 
 def _tables(tuning: Tuning, settings: dict[str, object]) -> dict[str, Any]:

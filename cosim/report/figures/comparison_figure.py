@@ -26,6 +26,7 @@ from cosim.drawing.style import (
     axes_or_new,
     headline,
     new_figure,
+    picture,
     styled,
 )
 from cosim.report.figures.drawing import curve, legend_above, thin
@@ -124,6 +125,15 @@ def comparison_picture(signal: SignalComparison) -> Figure:
         legend_above(whole)
         legend_above(zoom, ["reference", "result", "tolerance tube"])
     return figure
+
+
+def comparison_bytes(signal: SignalComparison, kind: str) -> bytes:
+    """The picture of a signal as a file.
+
+    Args:
+        signal: that was compared, with its curves. kind: of file, ``png`` or ``svg``.
+    """
+    return picture(comparison_picture(signal), kind)
 
 
 def _worst_window(signal: SignalComparison) -> tuple[float, float] | None:
