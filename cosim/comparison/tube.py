@@ -125,15 +125,21 @@ def _band_before(curve: Curve, until: np.ndarray, tolerance: float, first: np.nd
 
 
 def project(curve: Curve, onto: Curve, tolerance: float) -> Curve:
-    """A held curve at the rows of another: of the values within the allowed time the nearest one.
+    """A held curve at the rows of another: its own value where it has a row there and none other within the allowed
+    time, else of the values within that time the nearest one.
 
     Args:
         curve: the finer one. onto: the coarser one. tolerance: [s].
     """
-    band = band_of(curve, onto.time, tolerance)
+    at, time = onto.time, curve.time
+    nearest = np.searchsorted(0.5 * (time[1:] + time[:-1]), at)
+    own = time[nearest]
+    gap = np.diff(time[np.flatnonzero(np.diff(time, prepend=-np.inf))], prepend=-np.inf, append=np.inf)
+    instant = np.cumsum(np.diff(time, prepend=-np.inf) > 0.0)[nearest] - 1
+    room = np.minimum(gap[instant], gap[instant + 1])
+    alone = np.isfinite(room) & (np.abs(own - at) <= BESIDE * room) & (room * (1.0 - BESIDE) > tolerance)
+    band = band_of(curve, np.where(alone, own, at), np.where(alone, 0.0, tolerance))
     values = np.where(onto.finite & band.evaluated, np.clip(onto.filled, band.low, band.high), band.low)
-    if abs(onto.time[-1] - curve.time[-1]) <= tolerance and _is_apart(curve, tolerance):
-        values[-1] = curve.filled[-1]
     return Curve(onto.time, values, held=True)
 
 
