@@ -153,6 +153,7 @@ def make_recording(
     asked = {column: said[s.name] for column, s in chosen.items() if s.name in said}
     kinds = {s.name: kind for s, kind in zip(chosen.values(), column_courses(result, chosen, asked), strict=True)}
     kept, lines = (frozenset(s.name for s in signals if kinds[s.name] == one) for one in ("held", "line"))
+    shared, fresh = (frozenset(map(str, _algorithm(result).get(key, ()))) for key in ("held", "fresh"))
     return Recording(
         source,
         time[rows],
@@ -166,8 +167,9 @@ def make_recording(
         frozenset(said),
         _is_run(result),
         _before_start(result, chosen, time[rows][0]),
-        *(frozenset(map(str, _algorithm(result).get(key, ()))) for key in ("held", "fresh")),
-        first_row=rows.start or 0,
+        shared,
+        fresh,
+        rows.start or 0,
     )
 
 
