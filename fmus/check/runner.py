@@ -223,6 +223,7 @@ class Runner(AbstractContextManager["Runner"]):
         declared = [component.variables[n] for n in inputs]
         starts = (self.starts.get(n, v.start) for n, v in zip(inputs, declared, strict=True))
         self._own = np.array([_number(start, 0.0) for start in starts])
+        self._inputs[:] = self._own
         self._lowest = np.array([_number(v.min, -np.inf) for v in declared])
         self._highest = np.array([_number(v.max, np.inf) for v in declared])
 

@@ -9,6 +9,9 @@ from lying_fmus import SLAVE, STATES, build, description
 from test_fmus.events import DEEDS, hostile_fmu
 
 from fmus.check import CheckReport, Class, Verdict, check_fmu
+from fmus.check.checked_instance import make_slave
+from fmus.check.runner import Runner
+from fmus.fmi.archive import open_archive
 
 PASS, NOTE, LIMIT, DISTRUST, SKIPPED = Verdict.PASS, Verdict.NOTE, Verdict.LIMIT, Verdict.DISTRUST, Verdict.SKIPPED
 
@@ -150,6 +153,27 @@ def test_warnings_of_calls_are_counted(tmp_path: Path) -> None:
     assert set(problems(report)) == {"warnings"}
     detail = "calls returned the status warning in a run of 25 steps: fmi2DoStep 14 times, first at t = 0.11 s"
     assert report.finding("warnings").detail == detail
+
+
+def test_a_stated_start_of_what_moves_is_no_value_that_is_not_taken(tmp_path: Path) -> None:
+    speed = 'name="speed" valueReference="3" causality='
+    xml = description().replace(f'{speed}"output"', f'{speed}"local"')
+    xml = xml.replace('<Unknown index="3"/></Outputs>', "</Outputs>")
+    report = check_fmu(build(tmp_path, xml=xml), starts={"speed": 2.0, "force": 0.5})
+    assert report.finding("values taken").verdict is PASS
+
+
+def test_a_run_that_is_not_excited_keeps_the_start_values_of_inputs(tmp_path: Path) -> None:
+    """As without them the steps would send zero."""
+    archive = open_archive(build(tmp_path, "BOUNDS_INPUT"))
+    with (
+        archive.unpacked() as folder,
+        Runner(lambda: make_slave(folder, archive.description), {"force": 0.1}, 0.0, 0.1) as runner,
+    ):
+        runner.begin(excited=False)
+        runner.steps_at_most(1)
+        assert runner.inputs == {"force": 0.1}
+        assert runner.component.read(["force"]) == 0.1
 
 
 def test_a_parameter_that_is_bounded_is_named(tmp_path: Path) -> None:

@@ -36,10 +36,13 @@ def _other_value(variable: ModelVariable, share: float) -> float | None:
 
 
 def _begun(context: Context, starts: Mapping[str, float]) -> Iterator[NotTaken]:
-    """What an instance does not have after initialisation of these start values."""
+    """The parameters among these and the stated start values that an instance does not have after its first step."""
     with context.fresh_runner(starts) as runner:
         runner.begin(excited=False)
-        yield from not_taken(runner.component, runner.starts)
+        runner.steps_at_most(1)  # some forget it in a step
+        variables = runner.component.variables
+        kept = {n: v for n, v in runner.starts.items() if variables[n].causality == "parameter"}
+        yield from not_taken(runner.component, kept)
 
 
 def _parameters_not_taken(context: Context) -> list[NotTaken]:
