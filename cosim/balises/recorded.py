@@ -107,10 +107,12 @@ class RecordedLayout:
     Args:
         records: in order of their stamps.
         source: where they come from, for people.
+        before: how many more were delivered before the run.
     """
 
     records: tuple[BaliseRecord, ...]
     source: str = ""
+    before: int = 0
     instants: np.ndarray = field(init=False, repr=False, compare=False)
     """Stamps of the balises that were delivered [s], increasing."""
 
@@ -134,9 +136,18 @@ class RecordedLayout:
         object.__setattr__(self, "instants", np.unique([r.stamp for r in self.records if r.kind == "true"]))
 
     def later(self, start: float) -> RecordedLayout:
-        """The same without what was delivered at or before `start` [s]."""
-        kept = [r for r in self.records if (r.stamp if r.kind == "missed" else r.delivered_at) > start]
-        return RecordedLayout(tuple(kept), self.source)
+        """The same without what was delivered before `start` [s]."""
+        first = start - TIME_TOLERANCE
+        kept = [r for r in self.records if (r.stamp if r.kind == "missed" else r.delivered_at) >= first]
+        lost = sum(r.kind != "missed" for r in self.records) - sum(r.kind != "missed" for r in kept)
+        return RecordedLayout(tuple(kept), self.source, self.before + lost)
+
+    def never_delivered(self, start: float, stop: float) -> list[str]:
+        """A warning of telegrams that a run from `start` to `stop` [s] does not reach; empty where it reaches all."""
+        after = sum(r.kind != "missed" and r.stamp > stop + TIME_TOLERANCE for r in self.records)
+        named = [f"{self.before} before it starts at {start:g} s"] if self.before else []
+        named += [f"{after} after it stops at {stop:g} s"] if after else []
+        return [f"{self.source}: telegrams outside the run are not delivered: {' and '.join(named)}."] if named else []
 
 
 class RecordedLocaliser(Localiser):

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 
+from cosim.balises.recorded import RecordedLayout
 from cosim.master.algorithms.choose import choose_algorithm
 from cosim.run.balise_service import BaliseRoles, balise_roles
 from cosim.run.checked_observers import Certificates, check_observers
@@ -74,6 +75,8 @@ def _parse_tables(task: RunTask, remarks: Remarks) -> Stated:
     layout = None
     if table.balises is not None:
         layout = make_layout(table.balises, table.start, table.stop, task.folder, task.where)
+        if isinstance(layout, RecordedLayout):
+            remarks.warn(*layout.never_delivered(table.start, table.stop))
     return Stated(layout, parse_connections(table.connections, task.where))
 
 

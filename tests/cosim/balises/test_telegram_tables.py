@@ -81,6 +81,31 @@ def test_an_observer_listens_to_a_log_without_a_true_position(tmp_path: Path) ->
     assert outcome["observer.position"][-1] == pytest.approx(20.0, abs=0.05)
 
 
+@pytest.mark.parametrize("kind", ["block2", "block3"])
+def test_a_telegram_of_the_very_start_is_delivered_and_those_outside_the_run_are_counted(
+    tmp_path: Path, kind: str
+) -> None:
+    """It moves the estimate as one a nanosecond later would. A missed one is nobody's loss."""
+    said: list[str] = []
+    ends = []
+    for stamp in (0.5, 0.5 + 1e-7):
+        events = f"stamp,position,kind\n0.1,1,true\n0.2,2,missed\n{stamp:.9f},1005,true\n1.6,1,true\n1.7,1,false\n"
+        scenario = without_position(tmp_path, events).set("observer.as", kind)
+        outcome = scenario.set("start", 0.5).set("stop", 1.5).run(warn=said.append)
+        assert [e.outcomes["observer"] for e in outcome.result.events] == ["accepted"]
+        ends.append(outcome["observer.position"][-1])
+    assert ends[0] > 900.0
+    assert ends[0] == pytest.approx(ends[1], abs=1e-3)  # gains of 1e4 1/s over 1e-7 s
+    words = "telegrams outside the run are not delivered: 1 before it starts at 0.5 s and 2 after it stops at 1.5 s."
+    assert [text.partition("telegrams.csv: ")[2] for text in said if "outside" in text] == [words] * 2
+
+
+def test_where_all_telegrams_lie_in_the_run_nothing_is_said_of_them(tmp_path: Path) -> None:
+    said: list[str] = []
+    without_position(tmp_path, "stamp,position\n0,0\n1,10\n2,20\n").run(warn=said.append)
+    assert not [text for text in said if "not delivered" in text]
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
