@@ -71,6 +71,7 @@ class FmuFilterModel:
         self._seen = [_place(model, "output", model.outputs, name) for name in table.measurements]
         self._R = np.diag([value**2 for value in table.measurements.values()])
         self._balise = None if table.balise is None else _place(model, "output", model.outputs, table.balise)
+        self._metre = 1.0 if table.balise is None else _metre(model, table.balise)
         intensity = np.diag(_by_name(model, "state", model.states, table.process_noise) ** 2)
         noisy = np.diag(_by_name(model, "input", model.inputs, table.input_noise) ** 2)
         self._engine = _engine(table, model, Noises(intensity, noisy))
@@ -140,7 +141,8 @@ class FmuFilterModel:
         journal = self._begun(stamp)
         assert self._balise is not None
         deviation = location_accuracy if location_accuracy > 0.0 else self._made_of[1].balise_deviation
-        taken = journal.correct(stamp, self._u, [self._balise], np.array([position]), np.array([[deviation**2]]))
+        y, R = np.array([position * self._metre]), np.array([[(deviation * self._metre) ** 2]])
+        taken = journal.correct(stamp, self._u, [self._balise], y, R)
         return self._values(journal.t) if taken else False
 
     def get_state(self) -> Any:
@@ -279,6 +281,19 @@ def _place(model: SealedModel, what: str, names: tuple[str, ...], name: str) -> 
     if name not in names:
         raise FmuModelError(f"{model.path}: no {what} {name!r}; {nearest(name, names)}")
     return names.index(name)
+
+
+def _metre(model: SealedModel, name: str) -> float:
+    """A metre in the unit of an output that is a position; what has no unit that we know is taken as metres."""
+    try:
+        unit = parse_unit(model.unit(name))
+    except UnitError:
+        return 1.0
+    if unit.exponents not in (parse_unit("m").exponents, parse_unit("1").exponents):
+        raise FmuModelError(
+            f"{model.path}: balise = {name!r}: it is in {model.unit(name)}; a telegram measures a position [m]."
+        )
+    return 1.0 / unit.factor
 
 
 def _by_name(model: SealedModel, what: str, names: tuple[str, ...], stated: Mapping[str, float]) -> Array:

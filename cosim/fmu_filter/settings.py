@@ -17,7 +17,8 @@ _NotNegative = Annotated[float, Field(ge=0.0)]
 class FilterTable(TomlTable):
     """A filter over the FMU of its component.
 
-    Each key of a mapping is a name of the FMU; standard deviations are in the unit of that variable.
+    Each key of a mapping is a name of the FMU; standard deviations are in the unit that the FMU has for that variable,
+    as start values are, while results are in SI.
     """
 
     kind: Kind = Field(description="`ekf`, `ukf`, `ensemble` or `particle`")
@@ -27,19 +28,24 @@ class FilterTable(TomlTable):
     states: list[str] | None = Field(default=None, description="states; those that the FMU declares by default")
     outputs: list[str] | None = Field(default=None, description="outputs that are estimated; all by default")
     measurements: dict[str, _Positive] = Field(
-        default={}, description="outputs of the FMU that are measured, with standard deviations"
+        default={}, description="outputs of the FMU that are measured, with standard deviations in the FMU's unit"
     )
     sample_period: _Positive | None = Field(
         default=None, description="time between samples of the measurements [s]; every communication step by default"
     )
     process_noise: dict[str, _NotNegative] = Field(
-        default={}, description="by state: standard deviation that a second adds, in the unit of the state by sqrt(s)"
+        default={},
+        description="by state: standard deviation that a second adds, in the FMU's unit of the state by sqrt(s)",
     )
     input_noise: dict[str, _NotNegative] = Field(
-        default={}, description="by input: standard deviation, held over a step; enters the model where the input does"
+        default={},
+        description="by input: standard deviation in the FMU's unit, held over a step; enters the model where the "
+        "input does",
     )
     start_deviation: dict[str, _NotNegative] = Field(
-        default={}, description="by state, or start value of a `particle` filter: standard deviation at the start"
+        default={},
+        description="by state, or start value of a `particle` filter: standard deviation at the start in the FMU's "
+        "unit",
     )
     balise: str | None = Field(default=None, description="output that a telegram measures, a position [m]")
     balise_deviation: _Positive = Field(

@@ -11,10 +11,12 @@ from test_fmus.build import linear_fmu
 
 import cosim
 import fmus
+from cosim.components.loading import describe_fmu
 from cosim.errors import ScenarioError
 from cosim.fmu_filter import component
 from cosim.fmu_filter.component import FmuFilterModel, _legal_names
 from cosim.fmu_filter.settings import FilterTable
+from cosim.fmu_filter.taken_as import taken_as
 from cosim.fmu_model.sealed import FmuModelError
 from fmu_observer.formulas.filtering import kalman, unscented
 from fmu_observer.formulas.filtering.square_root import factor
@@ -266,6 +268,47 @@ def test_particles_need_something_that_moves_them_apart(tmp_path: Path) -> None:
     table = FilterTable.model_validate({"kind": "particle", "measurements": {"y1": 0.1}})
     with pytest.raises(FmuModelError, match="nothing moves the particles apart"):
         FmuFilterModel(path, table)
+
+
+def _lorry(folder: Path, units: dict[str, str]) -> Path:
+    """Force to position and speed, with a mass of one."""
+    states = [[0, 1], [0, 0]], [[0], [1]], [[1, 0], [0, 1]], [[0], [0]]
+    return linear_fmu(folder, "lorry", *states, inputs=["force"], outputs=["place", "v"], units=units)
+
+
+def test_deviations_in_other_units_than_si_are_noted_in_both(tmp_path: Path) -> None:
+    _lorry(tmp_path, {"v": "km/h", "force": "kN", "place": "m"})
+    scenario = cosim.Scenario(folder=tmp_path, stop=0.2, step=0.1).add("plant", fmu="lorry.fmu")
+    noises = {"measurements": {"v": 0.5, "place": 2.0}, "input_noise": {"force": 0.25}}
+    scenario.add("f", fmu="lorry.fmu", filter={"kind": "particle", "members": 5, **noises})
+    scenario.connect("plant.v -> f.measured_v", "plant.place -> f.measured_place")
+    notes = [note for note in scenario.run(warn=lambda _: None).result.summary["notes"] if "deviations" in note]
+    assert notes == [
+        "f: filter: standard deviations are in the FMU's own units, results in SI; taken as "
+        "measurements.v = 0.5 km/h (0.139 m/s), input_noise.force = 0.25 kN (250 N)."
+    ]
+    fmu = describe_fmu(tmp_path / "lorry.fmu", "f")
+    assert taken_as(FilterTable.model_validate({"kind": "ukf", "measurements": {"place": 1.0}}), fmu) == []
+
+
+def test_a_telegram_in_metres_measures_a_position_in_kilometres(tmp_path: Path) -> None:
+    """The same numbers of another unit: the particles of 1 m and of 0.001 km have the same weights."""
+    found = []
+    for unit, metre in (("m", 1.0), ("km", 1e-3)):
+        folder = tmp_path / unit
+        folder.mkdir()
+        noises = {"start_deviation": {"x0[1]": 2.0 * metre}, "balise": "place", "members": 30}
+        table = FilterTable.model_validate({"kind": "particle", "measurements": {"v": 1.0}, **noises})
+        filter_ = FmuFilterModel(_lorry(folder, {"place": unit}), table)
+        filter_.step(0.0, {"force": 0.0, "measured_v": 0.0}, 0.1)
+        out = filter_.balise(0.1, 1.5)
+        assert isinstance(out, dict)
+        found.append([out["place"] / metre, out["place_std"] / metre, out["nis"]])
+    assert 0.0 < found[0][0] < 1.5
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
+    wrong = FilterTable.model_validate({"kind": "particle", "start_deviation": {"x0[1]": 1.0}, "balise": "v"})
+    with pytest.raises(FmuModelError, match=r"balise = 'v': it is in km/h; a telegram measures a position \[m\]"):
+        FmuFilterModel(_lorry(tmp_path, {"v": "km/h"}), wrong)
 
 
 def test_particles_of_model_exchange_find_what_those_of_co_simulation_do() -> None:
