@@ -21,7 +21,7 @@ DEFAULT_OBSERVER, WITHOUT_EFFORT, DENSE = "quasi_lpv_uio", "odometer_reset", "di
 """What a stranger gets beside an effort, and without one; and what is far better with a balise every half second at all
 times, which no FMU says and no train has that starts from standstill, so it is named only."""
 HORIZON, STEP, SHORTEST, LONGEST = 60.0, 0.01, 1e-3, 0.5
-JOURNEY = 10.0  # [s]: what an FMU names below it is a default of its tool
+_JOURNEY = 10.0  # [s]: what an FMU names below it is a default of its tool
 RADIUS, PERIOD = 0.5, 0.01
 PRESETS = {"takagi_sugeno_cdo": "long_gaps"}
 """What is offered beside balises laid by distance, whose gaps nobody knows beforehand: gains that no gap makes
@@ -153,7 +153,7 @@ def _own_span(inspected: InspectedFmu, stop: float, step: float) -> tuple[float,
     """Start and stop [s] of the journey that is in an FMU without an input to drive it, and where they come from."""
     advised = inspected.description.defaultExperiment
     begin, end = (number(advised.startTime) or 0.0, number(advised.stopTime)) if advised else (0.0, None)
-    if end is None or not JOURNEY <= end - begin < inf:
+    if end is None or not _JOURNEY <= end - begin < inf:
         return 0.0, stop, ""
     end = round(begin + round((end - begin) / step) * step, 9)
     return begin, end, "from the FMU's default experiment"

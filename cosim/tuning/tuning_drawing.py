@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @styled
-def convergence_figure(tuning: Tuning) -> Figure:
+def _convergence_figure(tuning: Tuning) -> Figure:
     """The best cost so far over the candidates that were asked for, a line for each search, and the cost before.
 
     Args:
@@ -41,4 +41,4 @@ def draw_convergence(tuning: Tuning, kind: str) -> dict[str, bytes]:
     Args:
         tuning: what was found. kind: of file, ``png`` or ``svg``.
     """
-    return {"convergence": picture(convergence_figure(tuning), kind)}
+    return {"convergence": picture(_convergence_figure(tuning), kind)}

@@ -12,7 +12,7 @@ from fmus.fmi.described import Described
 from fmus.fmi.types import FLOATING_TYPES
 from fmus.fmi.values import exact_reader
 
-SINGLE = 1e-6
+_SINGLE = 1e-6
 """Share by which a number may differ that the instance holds in single precision, as some tools do."""
 
 
@@ -63,7 +63,7 @@ def _held(instance: Described, name: str) -> list[Any] | None:
 def _same(kind: str | None, a: Any, b: Any) -> bool:
     if kind not in FLOATING_TYPES:
         return bool(a == b) or (kind in ("String", "Binary") and not b)  # a text that is written only
-    return a == b or (math.isnan(a) and math.isnan(b)) or math.isclose(a, b, rel_tol=SINGLE)
+    return a == b or (math.isnan(a) and math.isnan(b)) or math.isclose(a, b, rel_tol=_SINGLE)
 
 
 def _short(value: Any) -> str:

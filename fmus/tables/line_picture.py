@@ -23,8 +23,8 @@ _MOST_CURVES, _PIECES, _FEWEST_PIECES = 12, 800, 40
 _TICKS, _MARGIN = 5, 0.06
 _FONT = "font: 12px system-ui, sans-serif"
 
-Style = Literal["", "true", "measured", "wanted", "allowed"]
-_STROKES: dict[Style, str] = {
+_Style = Literal["", "true", "measured", "wanted", "allowed"]
+_STROKES: dict[_Style, str] = {
     "true": 'stroke="currentColor" stroke-width="2.6" stroke-opacity="0.55"',
     "measured": 'stroke="#8c8c8c" stroke-width="1"',
     "wanted": 'stroke="currentColor" stroke-width="1" stroke-dasharray="5 3"',
@@ -45,7 +45,7 @@ class Line:
     label: str
     x: np.ndarray
     y: np.ndarray
-    style: Style = ""
+    style: _Style = ""
     held: bool = False
 
 
