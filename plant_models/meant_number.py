@@ -12,8 +12,10 @@ _WHOLE = r"[-+]?(?:\d{1,3}(?:\.\d{3})+(?=,)|\d{1,3}(?:\.\d{3}){2,}|\d{1,3}(?:[' 
 _NUMBER = rf"(?P<whole>{_WHOLE})(?:(?P<mark>[.,])(?P<part>\d+))?(?P<power>[eE][-+]?\d+)?"
 _GROUPED = r"(?P<whole>[-+]?\d{1,3}(?:,\d{3})+)(?P<mark>\.)(?P<part>\d+)(?P<power>[eE][-+]?\d+)?"
 """English: commas between thousands."""
+_CUT = r"(?P<whole>[-+]?\d*)(?P<mark>[.,])(?P<part>\d*)(?P<power>[eE][-+]?\d+)?"
+"""No digit on one side of the mark: ``.05``, ``5.``, which TOML takes for no numbers."""
 _UNIT = r"\s*(?P<unit>[A-Za-zµ°%‰][\w/.°%^*-]*)?"
-_MEANT = [re.compile(rf"\s*{number}{_UNIT}\s*") for number in (_GROUPED, _NUMBER)]
+_MEANT = [re.compile(rf"\s*{number}{_UNIT}\s*") for number in (_GROUPED, _NUMBER, rf"(?=[-+]?[.,]?\d){_CUT}")]
 _NO_DIGIT = re.compile(r"[^\d+-]")
 
 
@@ -35,12 +37,16 @@ def meant_number(stated: str, *, whole: bool = False, with_unit: Callable[[float
     if found is None:
         return ""
     digits = _NO_DIGIT.sub("", found["whole"])
+    cut = bool(found["mark"]) and not (digits[-1:].isdigit() and found["part"])
+    digits += "" if digits[-1:].isdigit() else "0"
     written = f"{digits}.{found['part']}" if found["part"] else digits
     written += found["power"] or ""
     if whole:
         return _whole(float(written), found)
     if found["unit"]:
         return with_unit(float(written), found["unit"])
+    if cut:
+        return f"; write {written}"
     if digits != found["whole"]:
         return f"; write {written}, with a point and no marks between thousands"
     return f"; write a point in place of the comma: {written}" if found["mark"] == "," else ""

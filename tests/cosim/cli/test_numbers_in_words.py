@@ -6,11 +6,14 @@ from __future__ import annotations
 
 import argparse
 import re
+import tomllib
 from collections.abc import Iterator
 from typing import Any, get_args
 
 import pytest
 from fmpy.model_description import ModelVariable
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import BaseModel
 
 from cosim.cli import PROGRAM as COSIM
@@ -21,6 +24,7 @@ from cosim.scenario.scenario_tables import BalisesTable, ComponentTable, Iterati
 from cosim.scenario.schema import ScenarioTable, parse_part
 from fmus.cli import PROGRAM as FMUS
 from fmus.cli.commands import find_commands
+from plant_models.meant_number import meant_number
 
 PROGRAMS = {program.name: program for program in (COSIM, FMUS)}
 WRITTEN = {"0,01": "0.01", "1.000,5": "1000.5", "1e-2 s": "0.01", "10 %": "10"}
@@ -105,6 +109,7 @@ def test_a_key_of_a_scenario(path: tuple[str, ...], key: str) -> None:
 
 
 LINES = {
+    "sweep freight_profile_d --vary takagi_sugeno_cdo.mass=.05,.1": "mass: expected a number; write 0.05 (got '.05')",
     "run freight_profile_d --set seed=1,5": "; with its comma it means 1.5",
     "run freight_profile_d --set stop=1.000,5": "stop: expected a number; write 1000.5, with a point",
     "sweep freight_profile_d --vary step=0,01": "--vary: 0,01: a comma stands between values; write 0.01 with a point.",
@@ -124,6 +129,23 @@ def test_a_value_beside_a_name(line: str, capsys: pytest.CaptureFixture[str]) ->
     shown = capsys.readouterr()
     assert (shown.out, shown.err.count("\n")) == ("", 1)
     assert LINES[line] in shown.err
+
+
+@given(
+    st.sampled_from(["", "-", "+"]),
+    st.sampled_from([("", "05"), ("7", ""), ("", "5"), ("120", "")]),
+    st.sampled_from([".", ","]),
+    st.sampled_from(["", "e3", "E-2"]),
+)
+def test_a_number_without_a_digit_on_one_side_of_its_mark(
+    sign: str, parts: tuple[str, str], mark: str, power: str
+) -> None:
+    """What to write is one number of TOML, and the one that was meant; no mark alone is a number."""
+    answer = meant_number(sign + mark.join(parts) + power)
+    assert answer.startswith("; write ")
+    meant = tomllib.loads(f"x = {answer.removeprefix('; write ')}")["x"]
+    assert meant == float(sign + ".".join(parts) + power)
+    assert meant_number(sign + mark + power) == ""
 
 
 def test_a_whole_parameter_of_a_model() -> None:
