@@ -70,8 +70,7 @@ class FmuFilterModel:
         self._start = model.start.copy()
         self._seen = [_place(model, "output", model.outputs, name) for name in table.measurements]
         self._R = np.diag([value**2 for value in table.measurements.values()])
-        self._balise = None if table.balise is None else _place(model, "output", model.outputs, table.balise)
-        self._metre = 1.0 if table.balise is None else _metre(model, table.balise)
+        self._balise, self._metre = _position(model, table.balise)
         intensity = np.diag(_by_name(model, "state", model.states, table.process_noise) ** 2)
         noisy = np.diag(_by_name(model, "input", model.inputs, table.input_noise) ** 2)
         self._engine = _engine(table, model, Noises(intensity, noisy))
@@ -283,17 +282,22 @@ def _place(model: SealedModel, what: str, names: tuple[str, ...], name: str) -> 
     return names.index(name)
 
 
-def _metre(model: SealedModel, name: str) -> float:
-    """A metre in the unit of an output that is a position; what has no unit that we know is taken as metres."""
+def _position(model: SealedModel, name: str | None) -> tuple[int | None, float]:
+    """The place of the output that telegrams measure, and a metre in its unit; what has no unit that we know is taken
+    as metres.
+    """
+    if name is None:
+        return None, 1.0
+    place = _place(model, "output", model.outputs, name)
     try:
         unit = parse_unit(model.unit(name))
     except UnitError:
-        return 1.0
+        return place, 1.0
     if unit.exponents not in (parse_unit("m").exponents, parse_unit("1").exponents):
         raise FmuModelError(
             f"{model.path}: balise = {name!r}: it is in {model.unit(name)}; a telegram measures a position [m]."
         )
-    return 1.0 / unit.factor
+    return place, 1.0 / unit.factor
 
 
 def _by_name(model: SealedModel, what: str, names: tuple[str, ...], stated: Mapping[str, float]) -> Array:

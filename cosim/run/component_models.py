@@ -13,13 +13,12 @@ import plant_models
 from cosim import fmu_filter
 from cosim.components.component import Component
 from cosim.components.kept_libraries import load_shipped
-from cosim.components.loading import describe_fmu, load_block, load_fmu
+from cosim.components.loading import load_block, load_fmu
 from cosim.components.python import PythonComponent
 from cosim.components.python_model import PythonModel
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
-from cosim.fmu_filter.taken_as import taken_as
 from cosim.run.backends import FAULTS, Notify, Realised, Request, cannot_build, realise
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.paths import absolute, move_option_files
@@ -131,8 +130,6 @@ def component_factories(
             factories[name] = _of_system(name, table, systems[name], made)
         else:
             factories[name] = _of_file(name, table, folder, places[name], tolerance)
-        if table.filter is not None:
-            made.notes += taken_as(table.filter, describe_fmu((folder / str(table.fmu)).resolve(), name))
         if table.can_be_missing:
             factories[name] = partial(_declared, factories[name], table.can_be_missing, places[name])
     return factories, made.notes

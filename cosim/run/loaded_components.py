@@ -14,8 +14,10 @@ from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
 from cosim.components.description import read_description
+from cosim.components.loading import describe_fmu
 from cosim.components.start_values import StartValue, start_values
 from cosim.errors import CouplingError, ScenarioError
+from cosim.fmu_filter.taken_as import taken_as
 from cosim.run.component_models import LATE_PARAMETERS, component_factories
 from cosim.run.remarks import Remarks
 from cosim.run.run_seeds import component_seed
@@ -98,7 +100,7 @@ def load_components(
     table, folder = task.table, task.folder
     span = table.start, table.stop
     factories, notes = component_factories(table.components, folder, task.where, building, span, table.tolerance)
-    remarks.note(*notes)
+    remarks.note(*notes, *_deviations_of_filters(table, folder))
     files = {name: (folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
     _check_instances(files, task.where)
     components: dict[str, Component] = {}
@@ -109,6 +111,16 @@ def load_components(
         starts[name] = _component_starts(table.components[name], components[name], table.seed)
         _remark(components[name], remarks)
     return LoadedComponents(components, starts, factories)
+
+
+def _deviations_of_filters(table: ScenarioTable, folder: Path) -> list[str]:
+    """What the deviations of filters were taken as, where their FMUs have other units than SI."""
+    filters = {name: (part.filter, part.fmu) for name, part in table.components.items() if part.filter is not None}
+    return [
+        note
+        for name, (own, fmu) in filters.items()
+        for note in taken_as(own, describe_fmu((folder / str(fmu)).resolve(), name))
+    ]
 
 
 def _remark(component: Component, remarks: Remarks) -> None:
