@@ -42,7 +42,7 @@ def meant_number(stated: str, *, whole: bool = False, with_unit: Callable[[float
     written = f"{digits}.{found['part']}" if found["part"] else digits
     written += found["power"] or ""
     if whole:
-        return _whole(float(written), found)
+        return "" if written == stated.strip() and written.lstrip("+-").isdigit() else _whole(float(written), found)
     if found["unit"]:
         return with_unit(float(written), found["unit"])
     if cut:
