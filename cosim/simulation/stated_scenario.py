@@ -221,6 +221,7 @@ class StatedScenario:
         """An independent copy."""
         scenario = copy(self)
         scenario._data, scenario._warnings = deepcopy(self._data), list(self._warnings)
+        scenario._files = self._files  # which is left out for another process
         return scenario
 
     def table(self) -> ScenarioTable:

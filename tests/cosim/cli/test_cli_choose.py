@@ -40,7 +40,7 @@ def test_the_answer_comes_first_and_what_is_written_runs(
     assert main(["choose", scenario, *FEW, "--from", str(run), "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert {row["observer"] for row in data["rows"]} >= {"odometer_reset", "balise_odometer_ekf:tuned"}
-    assert [entry["name"] for entry in data["runs"]] == ["nominal", "seed 1", "harder 2"]
+    assert [entry["name"] for entry in data["runs"]][:3] == ["nominal", "seed 1", "harder seed 1"]
 
 
 def test_a_file_that_exists_is_kept(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ master.
 
 from __future__ import annotations
 
+import gc
 import json
 import zipfile
 from importlib.resources import files
@@ -186,6 +187,18 @@ def test_the_master_of_fmpy_runs_it(tmp_path: Path) -> None:
 
 
 # -- command line ---------------------------------------------------------------------------------------------------
+
+
+def test_what_was_unpacked_stays_as_long_as_a_copy_of_the_scenario(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pair(tmp_path)
+    made = Scenario(stop=0.25, step=0.125).add("ramp", fmu="ramp.fmu")
+    made.export_ssp(tmp_path / "alone.ssp")
+    changed = Scenario.load(tmp_path / "alone.ssp").with_settings({"ramp.x0[1]": 3.0})
+    gc.collect()  # the one that was loaded is gone
+    assert changed.run(progress=False).failure is None
 
 
 def test_export_info_list_and_run(
