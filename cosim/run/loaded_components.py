@@ -17,7 +17,7 @@ from cosim.components.description import read_description
 from cosim.components.loading import describe_fmu
 from cosim.components.start_values import StartValue, start_values
 from cosim.errors import CouplingError, ScenarioError
-from cosim.fmu_filter.taken_as import taken_as
+from cosim.fmu_filter.stated_deviations import taken_as
 from cosim.run.component_models import LATE_PARAMETERS, component_factories
 from cosim.run.remarks import Remarks
 from cosim.run.run_seeds import component_seed

@@ -16,7 +16,7 @@ from cosim.errors import ScenarioError
 from cosim.fmu_filter import component
 from cosim.fmu_filter.component import FmuFilterModel, _legal_names
 from cosim.fmu_filter.settings import FilterTable
-from cosim.fmu_filter.taken_as import taken_as
+from cosim.fmu_filter.stated_deviations import taken_as
 from cosim.fmu_model.sealed import FmuModelError
 from fmu_observer.formulas.filtering import kalman, unscented
 from fmu_observer.formulas.filtering.square_root import factor

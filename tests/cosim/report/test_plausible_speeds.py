@@ -35,7 +35,7 @@ def journey(top: float, step: float) -> tuple[np.ndarray, np.ndarray]:
     top=st.one_of(st.floats(3.0, 90.0), st.floats(-90.0, -3.0)),
     step=st.sampled_from([0.01, 0.1, 1.0]),
     wear=st.floats(0.9, 1.1),
-    locked=st.floats(0.0, 0.4),
+    locked=st.floats(0.0, 0.25),
 )
 def test_wear_slip_and_coarse_rows_are_no_units(top: float, step: float, wear: float, locked: float) -> None:
     position, speed = journey(top, step)
