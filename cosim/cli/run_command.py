@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -27,12 +28,15 @@ from cosim.results.results_folder import check_writable
 from cosim.results.unfinished import UNFINISHED
 from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
+from cosim.studies.shared_warnings import warning_lines
+from cosim.studies.sweep_files import PAGE
 from fmus.cli.colour import Role
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from fmus.tables.table import Table
 
+LOG = logging.getLogger(__name__)
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
 _ROLES: dict[str, Role] = {"good": "good", "doubt": "doubtful", "bad": "bad"}
 CALL_LOG = "calls.log"
@@ -115,6 +119,8 @@ def execute(options: argparse.Namespace) -> Output:
     study = None
     if options.seeds and outcome.failure is None:
         study = _study(scenario, options, directory / SEEDS)
+        for line in warning_lines(study.warnings, str(directory / SEEDS / PAGE), "seed"):
+            LOG.warning("%s", line)
         outcome = outcome.with_summary(seed_study=study.to_data())
         paths = _written(outcome, directory, options) | {"seeds": directory / SEEDS / "index.csv"}
     return _output(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)

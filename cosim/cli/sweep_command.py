@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import re
 import tomllib
 from pathlib import Path
@@ -17,12 +18,14 @@ from cosim.results.results_folder import FIGURES, check_writable
 from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
 from cosim.studies.sampling_plans import MOST, Range, uniform
+from cosim.studies.shared_warnings import counted, warning_lines
 from cosim.studies.sweep import Sweep
 from cosim.studies.sweep_files import PAGE, write_figures
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 
+LOG = logging.getLogger(__name__)
 DONE, _SOME_FAILED = 0, 1
 RANGE = re.compile(r"(-?\d+):(-?\d+)(?::(-?\d+))?")
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -83,14 +86,18 @@ def execute(options: argparse.Namespace) -> Output:
     if options.by is not None:
         studies.write_groups(result, options.by, directory)
     table = result.shown() if options.by is None else studies.groups_table(result, options.by)
-    unmet = f", {result.unmet}" if result.unmet else ""
-    ending = f"{len(result) - len(result.failed)} of {len(result)} runs done{unmet}: {directory}"
+    warnings = result.warnings
+    for line in warning_lines(warnings, str(directory / PAGE)):
+        LOG.warning("%s", line)
+    doubts = [text for text in (result.unmet, counted(len(warnings)) if warnings else "") if text]
+    done = f"{len(result) - len(result.failed)} of {len(result)} runs done"
+    ending = f"{', '.join([done, *doubts])}: {directory}"
     data = json.loads((directory / "index.json").read_text(encoding="utf-8"))
     drawn = write_figures(result, directory, options.figures)
     files = {"page": directory / PAGE} | ({"figures": directory / FIGURES} if drawn else {})
     if result.failed:
         return Output([table], data, files, code=_SOME_FAILED, verdict=ending, role="bad")
-    return Output([table], data, files, verdict=ending, role="doubtful" if unmet else "good")
+    return Output([table], data, files, verdict=ending, role="doubtful" if doubts else "good")
 
 
 def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:

@@ -33,12 +33,13 @@ class Ended:
 
     Args:
         row: what it gave; None where it gave nothing. failure: why it did not reach its end, or None.
-        seconds: wall time of the job [s].
+        seconds: wall time of the job [s]. warnings: what the user should know of it, whatever is kept as its row.
     """
 
     row: Any = None
     failure: Failure | None = None
     seconds: float = nan
+    warnings: Sequence[str] = ()
 
 
 class Job(ABC):

@@ -86,11 +86,11 @@ class Run(Job):
             return False
 
     def do(self) -> Ended:
-        """Run it and take what is wanted. What is doubtful is in the outcome, and not said for every run."""
+        """Run it and take what is wanted. Its warnings are handed over with the row, and not printed for every run."""
         outcome = self.scenario.run(overrides=self.settings, warn=_silent, progress=False)
         reason = outcome.failure
         failure = None if reason is None else Failure(reason, outside=reason == INTERRUPTED)
-        return Ended(self.take(outcome), failure)
+        return Ended(self.take(outcome), failure, warnings=tuple(outcome.warnings))
 
     def files(self) -> Sequence[ForeignFile]:
         """The files that the scenario names."""

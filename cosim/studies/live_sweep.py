@@ -16,6 +16,7 @@ from cosim.report.live.live_page import LivePage, Mood, PageCurve, PagePanel, Pa
 from cosim.results.results_folder import REPORT
 from cosim.studies.measures import UNMET, is_number, setting_text
 from cosim.studies.setting_units import setting_unit
+from cosim.studies.shared_warnings import counted
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, Table
 
@@ -51,12 +52,19 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
         sections=[
             Section("Runs", [Rows(table, links, folders)], is_open=True),
             Section("What failed", [result.troubles()], mood="bad"),
+            *_warnings(result),
         ],
     )
 
 
+def _warnings(result: SweepRuns) -> list[Section]:
+    """The distinct warnings of the runs, folded; nothing where there is none."""
+    lines = [warning.line() for warning in result.warnings]
+    return [Section(f"Warnings ({len(lines)})", [lines], mood="doubt")] if lines else []
+
+
 def measured_curves(result: SweepRuns) -> tuple[list[PageRecording], list[PagePanel]]:
-    """Measures over what was varied, and the panels that show them.
+    """Measures over what was varied, and the panels that show them, first of those that differ between the runs.
 
     Args:
         result: the runs.
@@ -97,8 +105,8 @@ def _known(result: SweepRuns, measure: str) -> list[tuple[SweepRun, float]]:
 
 
 def _measure(result: SweepRuns) -> Column | None:
-    """The measure that the page speaks of first."""
-    return next(iter(result.columns), None)
+    """The measure that the page speaks of first: one that differs between the runs, where there is one."""
+    return next(iter(result.varying_first), None)
 
 
 def _verdict(result: SweepRuns) -> PageVerdict:
@@ -107,13 +115,15 @@ def _verdict(result: SweepRuns) -> PageVerdict:
         return PageVerdict("No run was made.", "bad")
     text = f"{count - failed} of {count} runs came to their end"
     text += f", {result.unmet}." if result.unmet else " and met all expectations." if _is_met(result) else "."
-    column = _measure(result)
+    column = next(iter(result.columns), None)
     values = [value for _, value in _known(result, column.key)] if column is not None else []
     diverged = count - failed - len(values) if column is not None else 0
     text += _spreads(result)
     if diverged and column is not None:
         text += f" In {diverged} {column.heading} is no finite number."
-    mood: Mood = "bad" if failed == count else "doubt" if failed or diverged or result.unmet else ""
+    text += f" {counted(len(result.warnings))}." if result.warnings else ""
+    doubtful = failed or diverged or result.unmet or result.warnings
+    mood: Mood = "bad" if failed == count else "doubt" if doubtful else ""
     return PageVerdict(text, "good" if not mood and _is_met(result) else mood)
 
 
@@ -150,11 +160,15 @@ def _kind(column: Column) -> str:
 
 
 def _finding(result: SweepRuns) -> str:
-    """The run with the largest first measure, its settings, and which setting goes with it; or what failed first."""
+    """The run with the largest value of a measure that differs, its settings, and which setting goes with it; or what
+    failed first.
+    """
     column = _measure(result)
     known = _known(result, column.key) if column is not None else []
     if column is None or not known:
         return next(iter(result.troubles()), "")
+    if len(known) > 1 and not result.varies(column.key):
+        return "No measure differs between the runs: what is varied changes none of them."
     run, value = known[0]
     settings = ", ".join(f"{name} = {setting_text(run.settings.get(name))}" for name in result.names)
     unit = f" {column.unit}" if column.unit else ""
@@ -198,7 +212,7 @@ def _recordings(result: SweepRuns) -> list[PageRecording]:
 def _line(result: SweepRuns, against: str, label: str, runs: Sequence[SweepRun]) -> PageRecording:
     ordered = sorted(runs, key=lambda run: float(run.settings[against]))
     curves = []
-    for column in result.columns:
+    for column in result.varying_first:
         values = np.array([run.measures.get(column.key, np.nan) for run in ordered])
         curves.append(PageCurve(column.heading, column.factor * values, column.unit or "1"))
     x = np.array([float(run.settings[against]) for run in ordered])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
@@ -17,6 +17,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.run.signal_roles import report_spec
 from cosim.runs.engine import Progress
 from cosim.studies.measures import error_measures
+from cosim.studies.shared_warnings import SharedWarning, shared_warnings, warning_lines
 from fmus.tables.line_picture import Line, line_picture
 from fmus.tables.table import Parts, Readable, Table
 
@@ -34,12 +35,13 @@ class SeedRow:
 
     Args:
         seed: of the run. errors: (observer, phase) -> maximal speed error [m/s]; not of phases that the run did not
-            reach. failure: why it did not reach its end, or None.
+            reach. failure: why it did not reach its end, or None. warnings: what the user should know of it.
     """
 
     seed: int
     errors: Mapping[tuple[str, str], float]
     failure: str | None = None
+    warnings: Sequence[str] = ()
 
     def to_data(self) -> dict[str, Any]:
         """Plain data, one entry for each observer and phase: ``observer, phase``."""
@@ -78,6 +80,11 @@ class SeedStudy(Readable):
                 gathered.setdefault(key, []).append(error)
         return gathered
 
+    @property
+    def warnings(self) -> list[SharedWarning]:
+        """The distinct warnings of all seeds, each with the seeds that gave it."""
+        return shared_warnings({row.seed: row.warnings for row in self.each})
+
     def quartiles(self, observer: str, phase: str) -> tuple[float, float, float]:
         """Lower quartile, median and upper quartile of the maximal speed error [m/s].
 
@@ -111,8 +118,9 @@ class SeedStudy(Readable):
         return seed_table(self.rows(), f"Maximal speed error over {len(self.seeds)} seeds", failed)
 
     def parts(self) -> Parts:
-        """The table."""
-        return [self.table()]
+        """The table, and warnings of the seeds."""
+        warnings = [f"warning: {line}" for line in warning_lines(self.warnings, "the attribute warnings", "seed")]
+        return [self.table(), "\n".join(warnings)]
 
     def _picture_html(self) -> str:
         """The errors of each observer over the seeds, in the first phase."""
@@ -126,8 +134,10 @@ class SeedStudy(Readable):
         return line_picture(f"Maximal speed error, {phase} [m/s]", lines, "seed")
 
     def to_data(self) -> dict[str, Any]:
-        """Plain data: the seeds that ended, the quartiles, and a row for each seed."""
-        return {"seeds": self.seeds, "rows": self.rows(), "each": [row.to_data() for row in self.each]}
+        """Plain data: the seeds that ended, the quartiles, a row for each seed, and the warnings of the seeds."""
+        warnings = [warning.to_data() for warning in self.warnings]
+        each = [row.to_data() for row in self.each]
+        return {"seeds": self.seeds, "rows": self.rows(), "each": each, "warnings": warnings}
 
 
 def seed_study(
@@ -171,7 +181,7 @@ def seed_study(
         scheduler=scheduler,
         measures=_seed_measures,
     )
-    rows = [SeedRow(run.settings["seed"], _errors(run.measures), run.failure) for run in result.runs]
+    rows = [SeedRow(run.settings["seed"], _errors(run.measures), run.failure, run.warnings) for run in result.runs]
     if all(row.failure is not None for row in rows):
         raise RunError(f"No seed could be run to its end. Seed {rows[0].seed}: {rows[0].failure}")
     return SeedStudy(report_spec(scenario.table()), rows)

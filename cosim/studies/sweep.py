@@ -88,7 +88,8 @@ class Sweep(FirstScreen):
         jobs = self._jobs(whole, "")
         with make_executor(workers, scheduler, apart=_apart(jobs)) as executor:
             for done in run_jobs(jobs, executor, progress=progress):
-                yield SweepRun(done.number, done.job.settings, done.row, _reason(done))
+                warnings = () if done.row is None else tuple(done.row.warnings)
+                yield SweepRun(done.number, done.job.settings, done.row, _reason(done), warnings=warnings)
 
     def run(
         self,
@@ -156,7 +157,7 @@ class Sweep(FirstScreen):
 
 @dataclass
 class _Rows:
-    """What is kept of each run of a sweep: measures, what went wrong in taking them, and where its results are.
+    """What is kept of each run of a sweep: measures, what went wrong in taking them, warnings, where its results are.
 
     Args:
         measures: taken of an outcome where it is run. measure: the user's, taken here. keep: whether outcomes stay.
@@ -183,8 +184,9 @@ class _Rows:
 
     def row(self, number: int, job: Job, ended: Ended) -> dict[str, Any]:
         """The row of a run; its results are written."""
+        warnings = list(ended.warnings)
         if not isinstance(ended.row, Outcome):
-            return {"measures": ended.row or {}, "faults": [], "folder": None}
+            return {"measures": ended.row or {}, "faults": [], "folder": None, "warnings": warnings}
         outcome = ended.row
         own, faults = own_measures(outcome, self.measure)
         folder = run_folder(number) if self._written else None
@@ -192,7 +194,8 @@ class _Rows:
             write_outcome(outcome, job.settings, self.directory / folder, report=self.pages)
         if self.keep:
             self.outcomes[number] = outcome
-        return {"measures": {**self.measures(outcome), **own}, "faults": faults, "folder": folder}
+        measures = {**self.measures(outcome), **own}
+        return {"measures": measures, "faults": faults, "folder": folder, "warnings": warnings}
 
     def fits(self, number: int, row: Mapping[str, Any]) -> bool:
         """Whether the results of an earlier sweep's run stand in the folder that they would have in this one."""
@@ -204,7 +207,10 @@ class _Rows:
         measures = {name: nan if value is None else float(value) for name, value in row["measures"].items()}
         folder = None if row["folder"] is None or self.directory is None else self.directory / row["folder"]
         outcome = self.outcomes.get(done.number)
-        return SweepRun(done.number, done.job.settings, outcome, _reason(done), measures, tuple(row["faults"]), folder)
+        faults, warnings = tuple(row["faults"]), tuple(row.get("warnings", ()))  # an earlier journal has no warnings
+        return SweepRun(
+            done.number, done.job.settings, outcome, _reason(done), measures, faults, folder, warnings=warnings
+        )
 
 
 def _reason(done: Done) -> str | None:

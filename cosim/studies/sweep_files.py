@@ -80,6 +80,7 @@ def write_index(result: SweepRuns, directory: Path) -> dict[str, Path]:
         data = {
             "scenario": result.scenario.name,
             "varied": list(result.names),
+            "warnings": [warning.to_data() for warning in result.warnings],
             "runs": [_entry(r, directory) for r in result.runs],
         }
         paths["json"].write_text(json.dumps(jsonable(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
@@ -122,6 +123,7 @@ def _entry(run: SweepRun, directory: Path) -> dict[str, Any]:
         "measures": dict(run.measures),
         "failure": run.failure,
         "faults": list(run.faults),
+        "warnings": list(run.warnings),
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isnan, nan
+from math import isfinite, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,15 @@ from cosim.results.result import Result
 from cosim.run.outcome import Outcome
 from cosim.runs.runnable import RunnableScenario
 from cosim.studies.measures import UNMET, measure_unit, setting_text
+from cosim.studies.shared_warnings import SharedWarning, shared_warnings, warning_lines
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, FirstScreen, Parts, Table, name_column, text_column
 
 _OUTCOME = text_column("outcome", "outcome", "Whether the run came to its end and met the scenario's expectations")
 _RANGES, _MEASURES = 2, 4
 """Measures whose range stands in the first sentence, and those whose values stand below it."""
+_ROUNDING = 1e-9
+"""Share of its largest value by which a measure must change between runs to differ."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,7 @@ class SweepRun(FirstScreen):
         measures: numbers by name; see `cosim.studies.measures.error_measures`.
         faults: what went wrong in taking own measures.
         folder: where its results were written, or None.
+        warnings: what the user should know of it; none of a run of an earlier version that was taken over.
     """
 
     number: int
@@ -43,6 +47,7 @@ class SweepRun(FirstScreen):
     measures: Mapping[str, float] = field(default_factory=dict)
     faults: Sequence[str] = ()
     folder: Path | None = None
+    warnings: Sequence[str] = ()
 
     def first_screen(self) -> Parts:
         """Which run it is, why it ended early where it did, and what it left."""
@@ -102,6 +107,11 @@ class SweepRuns(FirstScreen):
         return f"{count} with expectations that are not met" if count else ""
 
     @property
+    def warnings(self) -> list[SharedWarning]:
+        """The distinct warnings of all runs, each with the runs that gave it."""
+        return shared_warnings({run.number: run.warnings for run in self.runs})
+
+    @property
     def measures(self) -> list[str]:
         """Names of all measures, in order of appearance."""
         return list(dict.fromkeys(name for run in self.runs for name in run.measures))
@@ -124,6 +134,20 @@ class SweepRuns(FirstScreen):
             Column(c.measure, c.label or c.measure, c.unit or self.unit(c.measure) or "", factor=c.factor, digits=4)
             for c in chosen
         ]
+
+    @property
+    def varying_first(self) -> list[Column]:
+        """The same, those first that are not equal in all runs: they show what the varied values change."""
+        return sorted(self.columns, key=lambda column: not self.varies(column.key))
+
+    def varies(self, measure: str) -> bool:
+        """Whether runs differ in the finite values of a measure by more than rounding.
+
+        Args:
+            measure: name of the measure.
+        """
+        values = [v for run in self.runs if isfinite(v := run.measures.get(measure, nan))]
+        return bool(values) and max(values) - min(values) > _ROUNDING * max(map(abs, values))
 
     def unit(self, measure: str) -> str | None:
         """Unit of a measure; None where nobody has said it.
@@ -170,20 +194,22 @@ class SweepRuns(FirstScreen):
         return self.shown().text()
 
     def first_screen(self) -> Parts:
-        """How many runs there are, what was varied, and between what the first of the measures lie; then the runs."""
+        """How many runs there are, what was varied, and between what the first measures lie that differ; warnings; the
+        runs.
+        """
         failed = f", {len(self.failed)} of which failed" if self.failed else ""
         done = f"{len(self.runs)} runs{failed}{f', {self.unmet}' if self.unmet else ''}"
-        ranges = [text for column in self.columns[:_RANGES] if (text := self._range(column))]
+        columns = self.varying_first
+        ranges = [self._range(column) for column in columns[:_RANGES] if self.varies(column.key)]
         sentence = f"{done}; varied: {', '.join(self.names) or 'nothing'}."
-        more = len(self.columns) - _MEASURES
+        more = len(columns) - _MEASURES
         left = f"{more} more measures: see text() and to_pandas()." if more > 0 else ""
-        return [" ".join([sentence, *ranges]), self._shown(self.columns[:_MEASURES]), left]
+        warnings = "\n".join(f"warning: {line}" for line in warning_lines(self.warnings, "the attribute warnings"))
+        return [" ".join([sentence, *ranges]), warnings, self._shown(columns[:_MEASURES]), left]
 
     def _range(self, column: Column) -> str:
-        """The smallest and the largest value of a measure and their runs, in a sentence; empty where it has none."""
+        """The smallest and the largest value of a measure and their runs, in a sentence."""
         values = {run.number: v for run in self.runs if not isnan(v := run.measures.get(column.key, nan))}
-        if not values:
-            return ""
         low, high = min(values, key=lambda n: values[n]), max(values, key=lambda n: values[n])
         ends = [f"{number(column.factor * values[n])} in run {n}" for n in (low, high)]
         return f"{column.title()}: from {ends[0]} to {ends[1]}."
