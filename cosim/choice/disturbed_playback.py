@@ -75,8 +75,8 @@ def _effort_channel(link: Link, disturbance: Disturbance, mass: float) -> _Distu
     }
     options = {"fault_count": len(slopes), "unit": "N"}
     table = {"model": "signal_fault", "options": options, "parameters": stated}
-    heard = connection(link, f"{_EFFORT}.healthy")
-    return _DisturbedChannel(link, f"{_EFFORT}.reading", {_EFFORT: table}, [heard])
+    line = connection(link, f"{_EFFORT}.healthy")
+    return _DisturbedChannel(link, f"{_EFFORT}.reading", {_EFFORT: table}, [line])
 
 
 def _odometer_channel(link: Link, disturbance: Disturbance, period: float) -> _DisturbedChannel:

@@ -88,7 +88,7 @@ def derived_parameters(known: Known, parts: ScenarioParts, run: Result) -> dict[
     if period is not None:
         found.setdefault(_PERIOD, (period, "changes in the recorded run"))
     if MASS not in found and speed is not None and "effort" in parts.template:
-        mass = _fitted_mass(run.time, speed, _heard(parts, run, "effort"))
+        mass = _fitted_mass(run.time, speed, _received(parts, run, "effort"))
         if mass is not None:
             found[MASS] = mass, "fitted to effort and speed of the recorded run; check it"
     if MASS in found:
@@ -204,7 +204,7 @@ def _seen_period(run: Result, name: str) -> float | None:
     return round(float(np.median(np.diff(changes))), 9) if len(changes) > 2 else None
 
 
-def _heard(parts: ScenarioParts, run: Result, name: str) -> np.ndarray | None:
+def _received(parts: ScenarioParts, run: Result, name: str) -> np.ndarray | None:
     """What observers hear as this input in a recorded run, in their unit; None where it is not recorded."""
     link = recorded_link(parts.template[name], parts.table, parts.folder)
     values, stated = recorded(run, link[0]), transformation(link)

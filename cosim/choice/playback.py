@@ -106,8 +106,8 @@ class ScenarioParts:
         """
         found: dict[str, Link] = {}
         if self.odometer is not None and self.odometer.partition(".")[0] in self.plant:
-            heard = (link for link in self.links if link[0] == self.odometer and link[1].endswith(".odometer"))
-            found["odometer"] = next(heard, (self.odometer, "odometer"))
+            wired = (link for link in self.links if link[0] == self.odometer and link[1].endswith(".odometer"))
+            found["odometer"] = next(wired, (self.odometer, "odometer"))
         for name in (*self.observers, *self.plant):
             for signal, link in self.sources(name).items():
                 if link[0].partition(".")[0] in self.plant:
