@@ -14,7 +14,7 @@ from cosim.choice.benchmark_scores import BenchmarkScores
 from cosim.choice.candidates import BenchmarkCandidate, Observers, find_candidates
 from cosim.choice.disturbances import Disturbance, Journey
 from cosim.choice.disturbed_playback import believing, channels, disturbed
-from cosim.choice.known_parameters import derived_parameters, implausible_mass, stated_parameters, true_signals
+from cosim.choice.known_parameters import derived_parameters, mass_remarks, stated_parameters, true_signals
 from cosim.choice.observer_runs import ObserverRun, ObserverRuns
 from cosim.choice.observer_scores import ObserverScore, divergence, gap_certified, longest_gap, measured
 from cosim.choice.playback import ScenarioParts, find_parts, recording_scenario
@@ -118,7 +118,7 @@ def benchmark_observers(
             warn(other)
         known = derived_parameters(stated, parts, result)
         if warn is not None:
-            for text in implausible_mass(known):
+            for text in mass_remarks(known):
                 warn(text)
         candidates, notes = find_candidates(scenario, parts, observers, known)
         wrong = Disturbance() if disturb is None else disturb(_journey(scenario, parts, result))

@@ -26,11 +26,14 @@ from fmus.tables.table import Column, Parts, Readable, Table, error_column, name
 
 INTERRUPTED = "interrupted"
 """Why fewer runs count where somebody wanted it so."""
+_NOMINAL = " (by the nominal run alone, which mostly names a wrong one)"
 _UNCORRECTED = (
     ". No telegram reached an observer in this run: the allowance counts from its start, and balises were not tried"
 )
 PLAIN = "odometer_reset"
 """What every observer has to beat."""
+_DISTURBED = ("odometer", "effort")
+"""Inputs of observers that disturbances act on, by their usual names."""
 _SHOWN = 8
 """How many of the best a page draws, beside the plain odometer."""
 _CUT = 12
@@ -90,7 +93,8 @@ class Choice(Readable):
             text = f"use {best.named}" + ("" if best.certified else " (nothing certifies it for these gaps)")
         else:
             text = f"nothing is safe here, least bad {best.named}, because of {best.why_not(self._acting(best))}"
-        return f"{stopped}{text}: {self._numbers(best)}{'' if self._corrected else _UNCORRECTED}"
+        alone = _NOMINAL if len(self.disturbances) == 1 and not self.stopped else ""
+        return f"{stopped}{text}{alone}: {self._numbers(best)}{'' if self._corrected else _UNCORRECTED}"
 
     @property
     def _corrected(self) -> bool:
@@ -194,8 +198,9 @@ class Choice(Readable):
         return f"at most {share} % of the allowance in {len(row.used)} runs, position error {number(row.rms)} m rms"
 
     def _acting(self, row: Row) -> dict[str, str]:
-        run, used = row.worst
-        return {d.name: d.cause(used.time) for d in self.disturbances if d.name == run}
+        (run, used), inputs = row.worst, row.candidate.sources
+        takes = {name: name in inputs or not {*_DISTURBED} & {*inputs} for name in _DISTURBED}  # by other names: both
+        return {d.name: d.cause(used.time, **takes) for d in self.disturbances if d.name == run}
 
     def _done(self) -> str:
         tried = [row for row in self.rows if row.tried]

@@ -159,7 +159,25 @@ def scenario_for_fmu(path: str | Path) -> Scenario:
         )
     if made.kind != "train":
         raise ScenarioError(f"{path}: no train in it, so there is nothing to choose for. {' '.join(made.remarks)}")
-    return Scenario(folder=file.parent, where=f"{file.stem}.toml", **tomllib.loads(made.text))
+    return Scenario(folder=file.parent, where=f"{file.stem}.toml", **_without_observers(tomllib.loads(made.text)))
+
+
+def _without_observers(data: dict[str, Any]) -> dict[str, Any]:
+    """The tables of a starter without its observer, which is a guess as the mass is that it was given."""
+    guessed = {name for name, table in data["components"].items() if "observer" in table}
+    kept = dict(data, components={name: table for name, table in data["components"].items() if name not in guessed})
+    lines = [line.partition(" -> ") for line in data["connections"] if isinstance(line, str)]
+    left = [
+        (source, [t for t in targets.split(", ") if t.partition(".")[0] not in guessed]) for source, _, targets in lines
+    ]
+    tables = [line for line in data["connections"] if not isinstance(line, str)]
+    kept["connections"] = [
+        *(f"{source} -> {', '.join(targets)}" for source, targets in left if targets),
+        *(table for table in tables if table["to"].partition(".")[0] not in guessed),
+    ]
+    kept["report"] = {key: value for key, value in data.get("report", {}).items() if key != "observers"}
+    kept.pop("expect", None)
+    return kept
 
 
 def _asked(candidate: BenchmarkCandidate) -> Any:

@@ -105,16 +105,16 @@ class Disturbance:
         """Whether it is one of those that do not count."""
         return self.name.startswith(_HARDER)
 
-    def cause(self, time: float) -> str:
+    def cause(self, time: float, *, odometer: bool = True, effort: bool = True) -> str:
         """What acts at an instant [s], in words.
 
         Args:
-            time: [s].
+            time: [s]. odometer, effort: whether the observer takes them; what it does not take cannot be the cause.
         """
-        for fault in self.faults:
+        for fault in self.faults if odometer else ():
             if fault.onset <= time <= fault.onset + fault.length + _APART:
                 return f"after a wheel that {'jams' if fault.kind < 0.0 else 'skids'} at {fault.onset:.0f} s"
-        for slope in self.slopes:
+        for slope in self.slopes if effort else ():
             if slope.onset <= time <= slope.onset + slope.length and self.mass != 1.0:
                 share = f"{100.0 * abs(self.mass - 1.0):.0f} % too {'much' if self.mass > 1.0 else 'little'} mass"
                 return f"on an unknown slope of {1e3 * slope.gradient:+.1f} per mille, with {share}"

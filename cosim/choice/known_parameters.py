@@ -16,7 +16,7 @@ from cosim.evaluation.roles import recorded
 from cosim.results.result import Result
 from cosim.run.component_models import make_declared, make_system, values_in_use
 from cosim.run.connections import recorded_link, transformation
-from cosim.run.plausible_masses import HEAVIEST, LIGHTEST
+from cosim.run.plausible_masses import HEAVIEST, LIGHTEST, PER_UNIT_MASS
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.simulation.scenario import Scenario
 from cosim.starter.guessed_signal import in_si
@@ -37,6 +37,7 @@ _PERIOD, _SPACING = "odometer_period", "expected_spacing"
 SHARED_PARAMETERS = (*_OF_THE_TRAIN, *_START_POSITION, *_START_SPEED, _PERIOD, _SPACING)
 """What train observers want to know of the train, of its odometer and balises, and where they believe it to start."""
 
+_FITTED = "fitted to effort and speed of the recorded run"
 _MOVING = 0.5  # [m/s]: from here on a run says something of mass
 
 
@@ -87,29 +88,41 @@ def derived_parameters(known: Known, parts: ScenarioParts, run: Result) -> dict[
     period = _seen_period(run, parts.template["odometer"][0]) if "odometer" in parts.template else None
     if period is not None:
         found.setdefault(_PERIOD, (period, "changes in the recorded run"))
-    if MASS not in found and speed is not None and "effort" in parts.template:
+    if not _is_of_a_train(found) and speed is not None and "effort" in parts.template:
         mass = _fitted_mass(run.time, speed, _received(parts, run, "effort"))
         if mass is not None:
-            found[MASS] = mass, "fitted to effort and speed of the recorded run; check it"
+            doubt = (
+                f", since {number(found[MASS][0])} kg ({found[MASS][1]}) is that of no train" if MASS in found else ""
+            )
+            found[MASS] = mass, f"{_FITTED}{doubt}; check it"
     if MASS in found:
         by_mass = {name: (value, "usual for this mass") for name, value in usual_resistance(found[MASS][0]).items()}
         found = by_mass | found
     return found
 
 
-def implausible_mass(known: Known) -> list[str]:
-    """That the mass which observers are to believe in is no train's, in words; nothing where it is, or nobody knows it.
+def mass_remarks(known: Known) -> list[str]:
+    """What is doubtful about the mass that observers are measured with, in words, or nothing.
 
     Args:
         known: from `derived_parameters`.
     """
-    value, source = known.get(MASS, (LIGHTEST, ""))
-    if LIGHTEST <= value <= HEAVIEST:
+    if MASS not in known:
+        return []
+    value, source = known[MASS]
+    if source.startswith(_FITTED):
+        return [f"mass = {number(value)} kg, {source}."]
+    if _is_of_a_train(known):
         return []
     return [
         f"mass = {number(value)} kg ({source}) is that of no train, and observers are measured with it: those that "
         "need one will look bad. State it [kg] as a parameter of an observer in the scenario (see cosim new)."
     ]
+
+
+def _is_of_a_train(known: Known) -> bool:
+    """Whether a mass is known that may be a train's, or the one of models whose forces are per unit mass."""
+    return MASS in known and (known[MASS][0] == PER_UNIT_MASS or LIGHTEST <= known[MASS][0] <= HEAVIEST)
 
 
 # -- what the scenario says -------------------------------------------------------------------------------------------

@@ -25,7 +25,7 @@ _THOUSAND = 1000.0
 _MASS, _FORCE = parse_unit("kg"), parse_unit("N")
 _WHOLE = "mass"
 """Name of the parameter by which models of trains, which are driven by a force, know their mass."""
-_PER_UNIT_MASS = 1.0
+PER_UNIT_MASS = 1.0
 """Mass [kg] with which models whose forces are per unit mass are computed."""
 
 
@@ -85,7 +85,7 @@ def _beside(mass: _Mass, other: _Mass) -> str:
 def _alone(mass: _Mass) -> str:
     """What is doubtful about one mass, or an empty text."""
     train = mass.of_train or (mass.stated and (mass.declared or 0.0) >= LIGHTEST)
-    if not train or mass.value == _PER_UNIT_MASS:
+    if not train or mass.value == PER_UNIT_MASS:
         return ""
     how = f"= {mass.text}" if mass.stated else f"is {mass.text}, its default, which"
     if _is_light(mass):

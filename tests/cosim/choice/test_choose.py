@@ -181,6 +181,11 @@ def test_balises_reach_whom_the_scenario_names_and_the_observer_that_is_chosen()
     assert "No telegram" not in found.answer
 
 
+def test_an_answer_of_the_nominal_run_alone_says_so(choice: Choice) -> None:
+    assert "by the nominal run alone" in choose(small(), ["odometer_reset"], seeds=0).answer
+    assert "by the nominal run alone" not in choice.answer
+
+
 def test_an_answer_without_any_telegram_says_so() -> None:
     assert "No telegram reached an observer" in choose(small().balises(latency=9.0), ["odometer_reset"], seeds=0).answer
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.choice.disturbances import Disturbance, Journey, OdometerFault, drawn
+from cosim.choice.disturbances import Disturbance, Journey, OdometerFault, Slope, drawn
 
 
 def journey(top: float, rate: float, cruise: float) -> Journey:
@@ -98,3 +98,11 @@ def test_a_train_that_runs_backwards_is_disturbed_as_one_that_runs_forwards(
     assert back.faults == ahead.faults
     assert len(back.slopes) > 0
     assert len({slope.gradient for slope in back.slopes}) <= len({slope.gradient for slope in ahead.slopes}) + 1
+
+
+def test_what_an_observer_does_not_take_is_no_cause() -> None:
+    both = Disturbance(mass=1.2, slopes=(Slope(0.0, 9.0, 0.01),), faults=(OdometerFault(1.0, 1.0, 0.5, 1.0),))
+    assert "skids" in both.cause(2.0)
+    assert "slope" in both.cause(2.0, odometer=False)
+    assert "skids" in both.cause(2.0, effort=False)
+    assert both.cause(8.5, effort=False) == ""

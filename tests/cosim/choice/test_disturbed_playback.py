@@ -17,7 +17,7 @@ from cosim.choice.benchmark import benchmark_observers
 from cosim.choice.candidates import BenchmarkCandidate, find_candidates
 from cosim.choice.disturbances import GRAVITY, Disturbance, Journey, OdometerFault, Slope
 from cosim.choice.disturbed_playback import believing
-from cosim.choice.known_parameters import derived_parameters, stated_parameters
+from cosim.choice.known_parameters import derived_parameters, mass_remarks, stated_parameters
 from cosim.choice.playback import find_parts
 from cosim.results.result import Result, SignalInfo
 from cosim.scenario.scenario_tables import ComponentTable
@@ -106,6 +106,12 @@ def test_the_mass_of_a_train_that_nobody_states_is_fitted_to_its_run(sign: float
     assert found["davis_a"][0] == pytest.approx(0.01 * found["mass"][0])
     assert found["estimated_speed"][0] == sign * speed[0]
     assert found["odometer_period"][0] == pytest.approx(0.1)
+    doubted = derived_parameters(
+        {"mass": (90.0, "as for the plant")}, parts, Result(table, [SignalInfo(n) for n in names])
+    )
+    assert doubted["mass"][0] == found["mass"][0]
+    assert mass_remarks(doubted)[0].endswith("since 90.0 kg (as for the plant) is that of no train; check it.")
+    assert mass_remarks({"mass": (1.0, "of models per unit mass")}) == []
     stated = stated_parameters(scenario, parts)
     assert derived_parameters(stated, parts, Result(table, []))["mass"][0] == 90e3
 
