@@ -32,7 +32,7 @@ def leave(records: Sequence[RegressionRecord]) -> Iterator[str]:
     if file := os.environ.get(SUMMARY):
         try:
             with Path(file).open("a", encoding="utf-8") as summary:
-                summary.write(step_summary(records))
+                summary.write(_step_summary(records))
         except OSError as error:
             yield f"The summary of the step could not be written to {file}: {error.strerror or error}"
 
@@ -41,7 +41,7 @@ def _failed(records: Sequence[RegressionRecord]) -> list[RegressionRecord]:
     return [record for record in records if record.status not in AS_BEFORE]
 
 
-def step_summary(records: Sequence[RegressionRecord]) -> str:
+def _step_summary(records: Sequence[RegressionRecord]) -> str:
     """The session in Markdown: how many are as before, and a table of the others and of what was delivered anew.
 
     Args:

@@ -155,7 +155,7 @@ def _add_arguments(parser: Any, arguments: Sequence[Argument | ArgumentGroup | A
         entry.add_to(parser)
 
 
-def add_command(subparsers: Any, name: str, module: Any) -> None:
+def _add_command(subparsers: Any, name: str, module: Any) -> None:
     """Add the parser of a command.
 
     Args:
@@ -269,7 +269,7 @@ class CommandProgram:
         used = next((word for word in words if not word.startswith("-")), None)
         module = f"{used}{_ENDING}".replace("-", "_")
         if used is not None and used.replace("-", "").isalnum() and (_folder(self.package) / module).is_file():
-            add_command(subparsers, used, import_module(f"{self.package}.{module.removesuffix('.py')}"))
+            _add_command(subparsers, used, import_module(f"{self.package}.{module.removesuffix('.py')}"))
             return parser
         commands = find_commands(self.package)
         if used is not None:

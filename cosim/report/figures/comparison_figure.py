@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
 
 from cosim.comparison.verdict import ComparisonFinding, Curves, SignalComparison
 from cosim.drawing.style import (
@@ -102,14 +101,11 @@ def _comparison_error_figure(signal: SignalComparison, ax: Axes | None = None) -
 
 
 @styled
-def comparison_picture(signal: SignalComparison) -> Figure:
-    """Curves in their tube, the error in its band, and the worst point enlarged, on one figure.
+def comparison_picture(signal: SignalComparison, kind: str) -> bytes:
+    """Curves in their tube, the error in its band, and the worst point enlarged, as a file.
 
     Args:
-        signal: the comparison, with its curves.
-
-    Returns:
-        The figure; save it with ``figure.savefig(path)``.
+        signal: the comparison, with its curves. kind: of file, ``png`` or ``svg``.
     """
     figure = new_figure((WIDTH, HEIGHT))
     headline(figure, f"{signal.name}: {signal.status}")
@@ -124,16 +120,7 @@ def comparison_picture(signal: SignalComparison) -> Figure:
         whole.axvspan(*window, color=GRID, linewidth=0, zorder=0.2, label="enlarged below")
         legend_above(whole)
         legend_above(zoom, ["reference", "result", "tolerance tube"])
-    return figure
-
-
-def comparison_bytes(signal: SignalComparison, kind: str) -> bytes:
-    """The picture of a signal as a file.
-
-    Args:
-        signal: that was compared, with its curves. kind: of file, ``png`` or ``svg``.
-    """
-    return picture(comparison_picture(signal), kind)
+    return picture(figure, kind)
 
 
 def _worst_window(signal: SignalComparison) -> tuple[float, float] | None:

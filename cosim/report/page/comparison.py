@@ -71,10 +71,10 @@ def draw_pictures(comparison: Comparison, kind: PictureKind = "png", most: int =
     Args:
         comparison: what to draw. kind: of file. most: number of pictures at most.
     """
-    from cosim.report.figures.comparison_figure import comparison_bytes  # noqa: PLC0415 - matplotlib only to draw
+    from cosim.report.figures.comparison_figure import comparison_picture  # noqa: PLC0415 - matplotlib only to draw
 
     drawable = [s for s in comparison.failed if s.curves is not None]
-    return {s.name: comparison_bytes(s, kind) for s in drawable[:most]}
+    return {s.name: comparison_picture(s, kind) for s in drawable[:most]}
 
 
 def comparison_page(comparison: Comparison) -> LivePage:

@@ -4,7 +4,6 @@ algorithm: equal bits from a results folder, and from a table where all is held;
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -24,13 +23,12 @@ from cosim.baselines.subject import make_subject
 from cosim.calibration.fitting import calibrate
 from cosim.calibration.fmu_runs import FmuRuns
 from cosim.calibration.recorded_signals import Selection, sort_columns
-from cosim.cli import calibrate_command
+from cosim.cli import PROGRAM, calibrate_command
 from cosim.errors import CosimError
 from cosim.results.load_result import load_result
 from cosim.run.outcome import Outcome
 from cosim.structure.structure_text import when
 from fmus import cached_fmu
-from fmus.cli.commands import add_command
 from plant_models import PLANTS
 from plant_models.hybrid import HybridSystem, PeriodicEvent, Runtime
 from plant_models.hybrid.signal import input_signal, memory, output_signal, parameter, scalar_names, state
@@ -370,9 +368,8 @@ def test_parameters_are_identified_as_the_effort_acted(tmp_path: Path, algorithm
         tmp_path / "run", report=False
     )
     words = ["calibrate", "running_resistance", str(tmp_path / "run"), "--signals", "speed=train.speed"]
-    parser = argparse.ArgumentParser()
-    add_command(parser.add_subparsers(), "calibrate", calibrate_command)
-    found, _ = calibrate_command._calibrated(parser.parse_args([*words, "--set", "mass=80e3"]))
+    words += ["--set", "mass=80e3"]
+    found, _ = calibrate_command._calibrated(PROGRAM.parser(words).parse_args(words))
     for name in ("davis_a", "davis_b", "davis_c"):
         assert found.values[name] == pytest.approx(true[name], rel=1e-5)
     fmu = cached_fmu(PLANTS["longitudinal_train"](), fmi_version=2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
 import pytest
@@ -11,7 +13,7 @@ from lxml import html
 from plugin_sessions import ONE, run, write
 
 from cosim.pytest_plugin.records import RegressionRecord
-from cosim.pytest_plugin.services import leave, step_summary
+from cosim.pytest_plugin.services import leave
 
 pytest_plugins = ["pytester"]
 
@@ -75,7 +77,10 @@ def test_texts_of_others_break_no_summary_and_no_remark(name: str, cause: str) -
     record = RegressionRecord(
         f"test.py::{name}", "b.json", "differs", headlines={"changed": cause}, file=f"/x/{name}.py"
     )
-    _, _, head, _, row, *rest = step_summary([record]).split("\n")
+    with TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("GITHUB_STEP_SUMMARY", str(Path(folder) / "summary.md"))
+        list(leave([record]))
+        _, _, head, _, row, *rest = (Path(folder) / "summary.md").read_bytes().decode().split("\n")
     assert (row.count("|"), head.count("|"), rest) == (6, 6, ["", ""])
     assert "<" not in row
     with pytest.MonkeyPatch.context() as patch:
