@@ -16,7 +16,7 @@ from cosim.report.live.live_page import LivePage, Mood, PageCurve, PagePanel, Pa
 from cosim.results.results_folder import REPORT
 from cosim.studies.measures import UNMET, is_number, setting_text
 from cosim.studies.setting_units import setting_unit
-from cosim.studies.shared_warnings import counted
+from cosim.studies.warnings_of_runs import counted
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, Table
 

@@ -17,7 +17,7 @@ from cosim.evaluation.spec import ReportSpec
 from cosim.run.signal_roles import report_spec
 from cosim.runs.engine import Progress
 from cosim.studies.measures import error_measures
-from cosim.studies.shared_warnings import SharedWarning, shared_warnings, warning_lines
+from cosim.studies.warnings_of_runs import SharedWarning, shared_warnings, warning_lines
 from fmus.tables.line_picture import Line, line_picture
 from fmus.tables.table import Parts, Readable, Table
 

@@ -15,7 +15,7 @@ from cosim.results.result import Result
 from cosim.run.outcome import Outcome
 from cosim.runs.runnable import RunnableScenario
 from cosim.studies.measures import UNMET, measure_unit, setting_text
-from cosim.studies.shared_warnings import SharedWarning, shared_warnings, warning_lines
+from cosim.studies.warnings_of_runs import SharedWarning, shared_warnings, warning_lines
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, FirstScreen, Parts, Table, name_column, text_column
 

@@ -16,8 +16,8 @@ from cosim.cli import main
 from cosim.runs.journal import JOURNAL
 from cosim.studies.live_sweep import sweep_page
 from cosim.studies.seed_runs import seed_study
-from cosim.studies.shared_warnings import shared_warnings, warning_lines
 from cosim.studies.sweep_runs import SweepRun, SweepRuns
+from cosim.studies.warnings_of_runs import shared_warnings, warning_lines
 
 LIGHT = "3 of 4 runs (run 0): train.mass = 80 kg is no mass of a train"
 """Of masses that somebody took for tonnes."""
