@@ -28,8 +28,7 @@ from cosim.results.results_folder import check_writable
 from cosim.results.unfinished import UNFINISHED
 from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
-from cosim.studies.sweep_files import PAGE
-from cosim.studies.warnings_of_runs import warning_lines
+from cosim.studies.warnings_of_runs import PAGE, warning_lines
 from fmus.cli.colour import Role
 from fmus.cli.commands import argument
 from fmus.cli.output import Output

@@ -19,8 +19,8 @@ from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
 from cosim.studies.sampling_plans import MOST, Range, uniform
 from cosim.studies.sweep import Sweep
-from cosim.studies.sweep_files import PAGE, write_figures
-from cosim.studies.warnings_of_runs import counted, warning_lines
+from cosim.studies.sweep_files import write_figures
+from cosim.studies.warnings_of_runs import PAGE, counted, warning_lines
 from fmus.cli.commands import argument
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar

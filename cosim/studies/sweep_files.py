@@ -15,13 +15,14 @@ from cosim.report.page.page_files import page_bytes
 from cosim.report.page.picture_files import Pictures, picture_kind, write_numbered
 from cosim.results.results_folder import FIGURES
 from cosim.studies.live_sweep import sweep_page
+from cosim.studies.warnings_of_runs import PAGE
 from fmus.tables.plain_data import jsonable
 
 if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
-_INDEX_CSV, _INDEX_JSON, PAGE = "index.csv", "index.json", "index.html"
+_INDEX_CSV, _INDEX_JSON = "index.csv", "index.json"
 MOST_PAGES = 60
 """Runs of a sweep up to which each has a page of its own; of others `cosim open` makes it."""
 

@@ -9,6 +9,8 @@ from typing import Any
 
 _NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
 """A number in a sentence; digits in the name of a component belong to that name."""
+PAGE = "index.html"
+"""Name of the page of many runs, which has all warnings."""
 _MOST_LINES = 5
 """Warnings that a command prints of its runs; all are on the page."""
 
