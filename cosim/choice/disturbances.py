@@ -142,7 +142,7 @@ def drawn(number: int, seed: int, journey: Journey) -> Disturbance:
         noise=rng.uniform(0.02, 0.1),
         loss=rng.uniform(0.05, 0.2),
         slopes=_slopes(rng, journey),
-        faults=_faults(rng, journey),
+        faults=_faults(rng, journey, -1.0 if number % 2 else 1.0),
     )
 
 
@@ -166,19 +166,37 @@ def _slopes(rng: np.random.Generator, journey: Journey) -> list[Slope]:
     ]
 
 
-def _faults(rng: np.random.Generator, journey: Journey) -> list[OdometerFault]:
-    """Jams while the train brakes, skids while it pulls, in the order of time and apart from each other."""
+def _faults(rng: np.random.Generator, journey: Journey, wanted: float) -> list[OdometerFault]:
+    """Jams while the train brakes, skids while it pulls, in the order of time and apart from each other.
+
+    Args:
+        wanted: the kind that gives way to no other where the journey is too short for both.
+    """
     moving = np.abs(journey.speed) > _MOVES
     pace = _accelerations(journey)
     jams = _instants(rng, journey.time[moving & (pace < _BRAKES)], every=15.0)
     skids = _instants(rng, journey.time[moving & (pace > _PULLS)], every=40.0)
-    found: list[OdometerFault] = []
+    every: list[OdometerFault] = []
     for onset, kind in sorted([(t, -1.0) for t in jams] + [(t, 1.0) for t in skids]):
         depth = rng.uniform(0.3, 1.0) if kind < 0.0 else rng.uniform(0.1, 0.5)
-        length = rng.uniform(0.5, 3.0)
-        if not found or onset > found[-1].onset + found[-1].length + _APART:
-            found.append(OdometerFault(onset, float(length), float(depth), kind))
-    return found
+        every.append(OdometerFault(onset, float(rng.uniform(0.5, 3.0)), float(depth), kind))
+    found = _apart(every)
+    if any(fault.kind == wanted for fault in found):
+        return found
+    return _apart([*(fault for fault in every if fault.kind == wanted), *found])
+
+
+def _apart(faults: Sequence[OdometerFault]) -> list[OdometerFault]:
+    """Those that are apart from all before them in this order, in the order of time."""
+    found: list[OdometerFault] = []
+    for one in faults:
+        if all(a.onset + a.length + _APART < b.onset for a, b in (sorted((one, o), key=_onset) for o in found)):
+            found.append(one)
+    return sorted(found, key=_onset)
+
+
+def _onset(fault: OdometerFault) -> float:
+    return fault.onset
 
 
 def _accelerations(journey: Journey) -> np.ndarray:
