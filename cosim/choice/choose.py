@@ -159,7 +159,8 @@ def scenario_for_fmu(path: str | Path) -> Scenario:
         )
     if made.kind != "train":
         raise ScenarioError(f"{path}: no train in it, so there is nothing to choose for. {' '.join(made.remarks)}")
-    return Scenario(folder=file.parent, where=f"{file.stem}.toml", **_without_observers(tomllib.loads(made.text)))
+    tables = _without_observers(tomllib.loads(made.text)) | {"title": file.name}
+    return Scenario(folder=file.parent, where=f"{file.stem}.toml", **tables)
 
 
 def _without_observers(data: dict[str, Any]) -> dict[str, Any]:

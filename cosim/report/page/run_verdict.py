@@ -245,9 +245,14 @@ def _span(mark: Mark) -> str:
 
 
 def _telegram_then(time: float, result: Result, marks: Sequence[Mark]) -> Iterator[str]:
-    """A telegram at that instant: no farther from it than the rows around it."""
+    """A telegram at that instant, no farther from it than the rows around it, or one that was on its way."""
     first = float(np.max(result.time[result.time < time], initial=-np.inf))
     last = float(np.min(result.time[result.time > time], initial=np.inf))
     then = [m for m in marks if first <= m.start <= last]
     for mark in [m for m in then if m.kind == "balise" or (m.kind == "telegram problem" and m.start > time)][-1:]:
         yield f"{mark.text}, at that instant"
+    for event in [e for e in result.events if e.stamp < first <= e.delivered_at][-1:]:
+        yield (
+            f"balise {event.identity} was passed at {instant(event.stamp)} s, and its telegram came at "
+            f"{instant(event.delivered_at)} s"
+        )
