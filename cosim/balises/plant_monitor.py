@@ -59,7 +59,7 @@ class PlantMonitor:
     Args:
         planned: the plant in the plan.
         position: column of its position within its outputs. speed: column of its speed.
-        position_scale, speed_scale: factors to [m] and [m/s].
+        to_metres, to_speed: factor and offset from the plant's own unit of position to [m], and of speed to [m/s].
     """
 
     def __init__(
@@ -67,13 +67,13 @@ class PlantMonitor:
         planned: PlannedComponent,
         position: int,
         speed: int,
-        position_scale: float = 1.0,
-        speed_scale: float = 1.0,
+        to_metres: tuple[float, float] = (1.0, 0.0),
+        to_speed: tuple[float, float] = (1.0, 0.0),
     ) -> None:
         self._planned, self.component, self.outputs = planned, planned.component, planned.outputs
         self.save, self.restore, self.release = self.component.save, self.component.restore, self.component.release
         self._position, self._speed = position, speed
-        self._scales = position_scale, speed_scale
+        self.to_metres, self.to_speed = to_metres, to_speed
         self.redo_differences = 0
         self.error = PlantError()
         """What the plant's own solver leaves open of its position."""
@@ -88,31 +88,25 @@ class PlantMonitor:
         """Column of the speed within the plant's outputs."""
         return self._speed
 
-    @property
-    def speed_scale(self) -> float:
-        """Factor from the plant's own unit of speed to [m/s]."""
-        return self._scales[1]
-
-    @property
-    def position_scale(self) -> float:
-        """Factor from the plant's own unit of position to [m]."""
-        return self._scales[0]
+    def metres(self, own: float) -> float:
+        """A position [m] from that in the plant's own unit."""
+        return own * self.to_metres[0] + self.to_metres[1]
 
     @property
     def position(self) -> float:
         """Position [m]."""
-        return float(self.outputs[self._position]) * self._scales[0]
+        return float(self.outputs[self._position]) * self.to_metres[0] + self.to_metres[1]
 
     @property
     def speed(self) -> float:
         """Speed [m/s]."""
-        return float(self.outputs[self._speed]) * self._scales[1]
+        return float(self.outputs[self._speed]) * self.to_speed[0] + self.to_speed[1]
 
     @property
     def motion(self) -> tuple[float, float]:
         """Position [m] and speed [m/s]."""
-        outputs, (position, speed) = self.outputs, self._scales
-        return float(outputs[self._position]) * position, float(outputs[self._speed]) * speed
+        outputs, (factor, offset), (by, shift) = self.outputs, self.to_metres, self.to_speed
+        return float(outputs[self._position]) * factor + offset, float(outputs[self._speed]) * by + shift
 
     def between(self, start: np.ndarray, share: float, position: float) -> np.ndarray:
         """The plant's outputs at a share of a step that began with outputs `start`, where its position was `position`
@@ -122,7 +116,7 @@ class PlantMonitor:
         """
         end = self.outputs
         outputs = np.where(self._planned.continuous, start + share * (end - start), start)
-        outputs[self._position] = position / self._scales[0]
+        outputs[self._position] = (position - self.to_metres[1]) / self.to_metres[0]
         return outputs
 
     def step(self, t: float, until: float) -> None:

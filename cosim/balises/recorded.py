@@ -215,7 +215,7 @@ class RecordedLocaliser(Localiser):
         """The same from the ends of a step that was taken; `start` are the outputs at `t`, shape (q,)."""
         share, own = min(max((stamp - t) / (until - t), 0.0), 1.0), self.watch.position_column
         position = start[own] + share * (self.watch.outputs[own] - start[own])
-        return self.watch.between(start, share, float(position) * self.watch.position_scale)
+        return self.watch.between(start, share, self.watch.metres(float(position)))
 
 
 def recorded_crossing(record: BaliseRecord) -> Crossing:

@@ -249,10 +249,8 @@ class BaliseService:
 
     def _false_telegram(self, false: FalseTelegram, t: float, until: float) -> BaliseRecord:
         stamp = max(false.time, t)
-        position = (
-            float(self._mixed(stamp, t, until, slice(None), self._plan.values)[self.position])
-            * self.localiser.watch.position_scale
-        )
+        own = float(self._mixed(stamp, t, until, slice(None), self._plan.values)[self.position])
+        position = self.localiser.watch.metres(own)
         reading = self._odometer_at(stamp, t, until)
         return BaliseRecord(stamp, stamp, "false", position + false.offset, position, 0.0, reading, "false")
 

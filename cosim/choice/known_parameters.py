@@ -159,7 +159,7 @@ def _plant_values(scenario: Scenario, table: ComponentTable) -> dict[str, float]
 
 def _fmu_values(scenario: Scenario, table: ComponentTable) -> dict[str, float]:
     """The same of an FMU: parameters of these names, and the mass by what it is called; set, or start values."""
-    inspected = inspect_fmu((scenario.folder / str(table.fmu)).resolve())
+    inspected = inspect_fmu((scenario.folder / str(table.fmu)).resolve(), table.units)
     signals = {signal.name: signal for signal in inspected.parameters}
     named = {name: signals[name] for name in _OF_THE_TRAIN if name in signals}
     mass = plant_roles(inspected).mass

@@ -138,10 +138,10 @@ def find_parts(scenario: Scenario) -> ScenarioParts:
 
 def _effort_of_fmu(scenario: Scenario, parts: ScenarioParts) -> str | None:
     """What drives the train's FMU, or its output that reports the effort, as far as their names say so."""
-    fmu = parts.table.components[parts.train].fmu if parts.train else None
-    if fmu is None:
+    train = parts.table.components[parts.train] if parts.train else None
+    if train is None or train.fmu is None:
         return None
-    roles = plant_roles(inspect_fmu((scenario.folder / fmu).resolve()))
+    roles = plant_roles(inspect_fmu((scenario.folder / train.fmu).resolve(), train.units))
     if roles.effort is not None:
         link = parts.sources(parts.train).get(roles.effort.signal.name)
         return None if link is None else link[0]

@@ -41,11 +41,11 @@ static int64_t first_ahead(const PlantMonitor *watch, double position) {
 }
 
 static double position_of(const Program *program, const double *values) {
-    return values[program->watch.position] * program->watch.position_scale;
+    return values[program->watch.position] * program->watch.position_factor + program->watch.position_offset;
 }
 
 static double speed_of(const Program *program, const double *values) {
-    return values[program->watch.speed] * program->watch.speed_scale;
+    return values[program->watch.speed] * program->watch.speed_factor + program->watch.speed_offset;
 }
 
 static bool is_near(Program *program, double h) {

@@ -153,7 +153,7 @@ class Crossings:
         columns = first + watch.position_column, first + watch.speed_column
         places = layout.positions if isinstance(layout, TrackLayout) else np.zeros(0)
         self._plant = program.slaves[place]
-        program.watch(place, *columns, (watch.position_scale, watch.speed_scale), places, ACCELERATION_LIMIT)
+        program.watch(place, *columns, (*watch.to_metres, *watch.to_speed), places, ACCELERATION_LIMIT)
         if isinstance(layout, InstantLayout):
             instants = self._instants(layout, program)
             head.by_instant, head.instant_count, head.instants = True, len(instants), keep(instants)

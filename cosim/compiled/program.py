@@ -109,12 +109,13 @@ class Program:
         self.head.rows_before = before
 
     def watch(
-        self, slave: int, position: int, speed: int, scales: tuple[float, float], places: np.ndarray, limit: float
+        self, slave: int, position: int, speed: int, units: tuple[float, ...], places: np.ndarray, limit: float
     ) -> None:
         """Have the stepper leave steps in which a balise may be passed.
 
         Args:
-            slave: place of the plant in the plan. position, speed: columns. scales: of these, to [m] and [m/s].
+            slave: place of the plant in the plan. position, speed: columns.
+            units: factor and offset of each, to [m] and [m/s].
             places: of the balises [m], increasing. limit: acceleration [m/s2].
         """
         columns = self.plan.steps[slave].columns
@@ -124,8 +125,10 @@ class Program:
             output_count=columns.stop - columns.start,
             position=position,
             speed=speed,
-            position_scale=scales[0],
-            speed_scale=scales[1],
+            position_factor=units[0],
+            position_offset=units[1],
+            speed_factor=units[2],
+            speed_offset=units[3],
             acceleration_limit=limit,
             places=self.keep(np.ascontiguousarray(places, dtype=np.float64)),
             place_count=len(places),

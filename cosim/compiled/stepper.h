@@ -112,7 +112,7 @@ typedef struct {
     int64_t slave;          /* its place in the plan, or -1 */
     int64_t first_output, output_count; /* columns */
     int64_t position, speed; /* columns */
-    double position_scale, speed_scale; /* to [m] and [m/s] */
+    double position_factor, position_offset, speed_factor, speed_offset; /* to [m] and [m/s] */
     double acceleration_limit;          /* [m/s2] */
     const double *places;               /* of the balises [m], increasing */
     int64_t place_count;

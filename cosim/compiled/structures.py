@@ -48,7 +48,8 @@ class CPlantMonitor(ctypes.Structure):
 
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("slave", "first_output", "output_count", "position", "speed")),
-        *((name, ctypes.c_double) for name in ("position_scale", "speed_scale", "acceleration_limit")),
+        *((name, ctypes.c_double) for name in ("position_factor", "position_offset", "speed_factor", "speed_offset")),
+        ("acceleration_limit", ctypes.c_double),
         ("places", ctypes.c_void_p),
         *((name, ctypes.c_int64) for name in ("place_count", "cursor")),
     )

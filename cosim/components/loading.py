@@ -8,7 +8,7 @@ import os
 import shutil
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,7 @@ from fmpy.model_description import ModelDescription
 from cosim.components.component import Component
 from cosim.components.description import open_fmu, read_description
 from cosim.components.fmi3 import FMI3Component
+from cosim.components.stated_units import NONE_STATED, StatedUnit, state_units
 from cosim.components.unpacking import unpack
 from cosim.errors import CouplingError, FmuLoadError, ScenarioError
 from cosim.process.exit_guard import guard_exit
@@ -199,20 +200,25 @@ class FMI2Component(Component, FMI2Slave):
 COMPONENTS: dict[int, Any] = {1: FMI1Component, 2: FMI2Component, 3: FMI3Component}
 
 
-def load_fmu(path: str | Path, name: str, tolerance: float | str | None = None) -> Component:
+def load_fmu(
+    path: str | Path, name: str, tolerance: float | str | None = None, units: Mapping[str, StatedUnit] = NONE_STATED
+) -> Component:
     """Unpack an FMU and prepare an instance of it.
 
     Args:
         path: the ``.fmu`` file.
         name: name of the component.
         tolerance: relative, for its solver, or ``none``; where not given the declared one.
+        units: what the scenario states of its variables, by name.
 
     Raises:
         FmuLoadError: the file is missing or broken, has no co-simulation, or no library for this platform.
+        CouplingError: the stated units do not fit it.
     """
     path = Path(path)
     archive = open_fmu(path, name)
     description = archive.description
+    state_units(description, units, name)
     if description.coSimulation is None:
         raise FmuLoadError(
             f"{name}: {path} offers no co-simulation interface; this master steps co-simulation FMUs only."
@@ -265,17 +271,19 @@ def _unpacked_and_loaded(archive: Archive, path: Path, name: str) -> tuple[Path,
         raise FmuLoadError(f"{name}: cannot load {path}: {lacks}{error}") from error
 
 
-def describe_fmu(path: str | Path, name: str) -> Component:
+def describe_fmu(path: str | Path, name: str, units: Mapping[str, StatedUnit] = NONE_STATED) -> Component:
     """A component of an FMU file that can be asked for its variables and not stepped: nothing is unpacked or loaded.
 
     Args:
         path: the ``.fmu`` file.
         name: of the component.
+        units: what the scenario states of its variables, by name.
 
     Raises:
-        FmuLoadError: as for `read_description`.
+        FmuLoadError: as for `read_description`. CouplingError: the stated units do not fit it.
     """
     description = read_description(path, name)
+    state_units(description, units, name)
     more = {"negated": negated_aliases(Path(path))} if fmi_version(description) == 1 else {}
     component: Component = COMPONENTS[fmi_version(description)](name, None, description, source=str(path), **more)
     return component

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from cosim.components.description import open_fmu
 from cosim.components.loading import load_fmu
+from cosim.components.stated_units import NONE_STATED, StatedUnit
 from cosim.errors import nearest
 from cosim.fmu_filter.belief import ExtendedFilter, FmuFilter, Noises, UnscentedFilter
 from cosim.fmu_filter.journal import EQUAL_WITHIN, FilterJournal
@@ -46,6 +47,7 @@ class FmuFilterModel:
 
     Args:
         path: the ``.fmu`` file. table: which filter. parameters: start values of the FMU by name.
+        units: what the scenario states of its variables, by name.
         checked: whether its states have been looked at already.
 
     Raises:
@@ -58,12 +60,13 @@ class FmuFilterModel:
         path: str | Path,
         table: FilterTable,
         parameters: Mapping[str, Any] | None = None,
+        units: Mapping[str, StatedUnit] = NONE_STATED,
         *,
         checked: bool = False,
     ) -> None:
-        self._made_of = path, table, dict(parameters or {})
+        self._made_of = path, table, dict(parameters or {}), units
         numbers = _numbers(parameters or {})
-        self._model = _opened(path, table, numbers)
+        self._model = _opened(path, table, numbers, units)
         model = self._model
         if not checked:
             _demand(table, model, numbers)
@@ -247,12 +250,16 @@ def _engine(table: FilterTable, model: SealedModel, noises: Noises) -> FmuFilter
     return ExtendedFilter(model, noises)
 
 
-def _opened(path: str | Path, table: FilterTable, parameters: Mapping[str, float]) -> SealedModel:
+def _opened(
+    path: str | Path, table: FilterTable, parameters: Mapping[str, float], units: Mapping[str, StatedUnit]
+) -> SealedModel:
     """The FMU with its states, or without where they are only saved."""
-    if table.kind != "particle":
-        return open_model(path, table.interface, states=table.states, outputs=table.outputs, parameters=parameters)
-    starts = {name: _start_value(path, name) for name in table.start_deviation if name not in parameters}
-    return open_model(path, table.interface, states=(), outputs=table.outputs, parameters={**parameters, **starts})
+    states, starts = table.states, dict[str, float]()
+    if table.kind == "particle":
+        states = []
+        starts = {name: _start_value(path, name) for name in table.start_deviation if name not in parameters}
+    settings = {**parameters, **starts}
+    return open_model(path, table.interface, states=states, outputs=table.outputs, parameters=settings, units=units)
 
 
 def _demand(table: FilterTable, model: SealedModel, parameters: Mapping[str, float]) -> None:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from fmpy.model_description import ModelDescription
 
 from cosim.components.description import open_fmu
+from cosim.components.stated_units import NONE_STATED, StatedUnit, state_units
 from cosim.components.unpacking import unpack
 from cosim.errors import FmuLoadError
 from cosim.fmu_model.co_simulation import CoSimulationModel
@@ -33,6 +34,7 @@ def open_model(
     outputs: Sequence[str] | None = None,
     inputs: Sequence[str] | None = None,
     parameters: Mapping[str, float] | None = None,
+    units: Mapping[str, StatedUnit] = NONE_STATED,
 ) -> SealedModel:
     """Open an FMU as a model whose states can be written.
 
@@ -43,16 +45,19 @@ def open_model(
         outputs: names of what is read; None for all real outputs.
         inputs: names of what is written; None for all real inputs.
         parameters: start values by name.
+        units: what is stated of its variables, by name, see `cosim.components.stated_units`.
 
     Returns:
         The model; `close` it at the end.
 
     Raises:
         FmuLoadError: the file is missing or broken, or cannot run here.
+        CouplingError: the stated units do not fit it.
         FmuModelError: it has no such interface, no states, unknown names, or states that cannot be set.
     """
     path = Path(path)
     archive = open_fmu(path, path.name)
+    state_units(archive.description, units, path.stem)
     chosen = _interface_of(archive.description, path, interface)
     try:
         archive.demand_this_platform(chosen)

@@ -206,7 +206,7 @@ def _plant_error(
     unknown = _why_unknown(method, report, signal, tolerance)
     if unknown or report is None:
         return PlantError(tolerance=tolerance, unknown=unknown)
-    scale = abs(_scale(component, str(table.position), "m"))
+    scale = abs(_conversion(component, str(table.position), "m")[0])
     spread, drift = (scale * seen.get(signal, 0.0) for seen in (report.spread, report.drift))
     if signal in report.spread and spread == 0.0:
         tolerance = 0.0
@@ -243,8 +243,8 @@ def make_service(
     watch = PlantMonitor(planned, 0, 0)  # where telegrams are recorded nobody looks at them
     if table.position is not None and table.speed is not None:
         position, speed = (plan.column(name) - first for name in (table.position, table.speed))
-        scales = [_scale(planned.component, name, unit) for name, unit in ((table.position, "m"), (table.speed, "m/s"))]
-        watch = PlantMonitor(planned, position, speed, *scales)
+        units = [_conversion(planned.component, n, unit) for n, unit in ((table.position, "m"), (table.speed, "m/s"))]
+        watch = PlantMonitor(planned, position, speed, *units)
     watch.error = choice.error
     localiser, channel = _sources(table, layout, watch, choice.method)
     receivers = [Receiver(plan.find(name), BALISE_EVENT, table.timing) for name in roles.receivers]
@@ -268,10 +268,10 @@ def _sources(table: BalisesTable, layout: Layout, watch: PlantMonitor, method: M
     return make_localiser(method, watch, layout, table.clock, table.jerk_bound), channel
 
 
-def _scale(component: Component, name: str, unit: str) -> float:
-    """Factor from the plant's own unit to [m] or [m/s]; 1 where it declares none."""
+def _conversion(component: Component, name: str, unit: str) -> tuple[float, float]:
+    """Factor and offset from the plant's own unit to [m] or [m/s]; 1 and 0 where it declares none."""
     try:
         declared = component.unit(name.partition(".")[2])
-        return 1.0 if declared is None else conversion(declared, parse_unit(unit))[0]
+        return (1.0, 0.0) if declared is None else conversion(declared, parse_unit(unit))
     except UnitError as error:
         raise CouplingError(f"{name} cannot be read in {unit} to find balises: {error}.") from error

@@ -151,7 +151,7 @@ def _of_file(
     if table.fmu is None:
         return partial(python_component, name, table, where)
     chosen = tolerance if table.tolerance is None else table.tolerance
-    return partial(load_fmu, (folder / table.fmu).resolve(), name, chosen)
+    return partial(load_fmu, (folder / table.fmu).resolve(), name, chosen, table.units)
 
 
 def _declared(factory: Callable[[], Component], missing: Sequence[str], where: str) -> Component:
@@ -189,7 +189,7 @@ def filter_component(name: str, table: ComponentTable, folder: Path, where: str)
     """
     assert table.filter is not None
     path = (folder / str(table.fmu)).resolve()
-    model = PythonModel(fmu_filter.FmuFilterModel(path, table.filter, table.parameters), {}, where)
+    model = PythonModel(fmu_filter.FmuFilterModel(path, table.filter, table.parameters, table.units), {}, where)
     return PythonComponent(name, model, f"{table.filter.kind} over {table.fmu}")
 
 

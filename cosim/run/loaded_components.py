@@ -115,11 +115,11 @@ def load_components(
 
 def _deviations_of_filters(table: ScenarioTable, folder: Path) -> list[str]:
     """What the deviations of filters were taken as, where their FMUs have other units than SI."""
-    filters = {name: (part.filter, part.fmu) for name, part in table.components.items() if part.filter is not None}
+    filters = {name: (part.filter, part) for name, part in table.components.items() if part.filter is not None}
     return [
         note
-        for name, (own, fmu) in filters.items()
-        for note in taken_as(own, describe_fmu((folder / str(fmu)).resolve(), name))
+        for name, (own, part) in filters.items()
+        for note in taken_as(own, describe_fmu((folder / str(part.fmu)).resolve(), name, part.units))
     ]
 
 

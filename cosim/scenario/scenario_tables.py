@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, PlainValidator, Tag, model_validator
 
 from cosim.components.recording_data import Interpolation
+from cosim.components.stated_units import Stated
 from cosim.errors import nearest
 from cosim.fmu_filter.settings import FilterTable
 from cosim.results.formats.known_formats import FORMATS
@@ -96,6 +97,7 @@ class ComponentTable(TomlTable):
     preset: str | None = None
     options: dict[str, Option] = {}
     parameters: Annotated[dict[str, Start], BeforeValidator(_starts)] = {}
+    units: dict[str, Stated] = {}
     tolerance: Tolerance | None = None
     late_policy: LatePolicy = "replay"
     replay_horizon: Annotated[float, Field(gt=0.0)] = 10.0
@@ -119,6 +121,8 @@ class ComponentTable(TomlTable):
             raise ValueError("'preset', 'options' and 'as' belong to shipped models; an FMU takes 'parameters' only")
         if stated != ["fmu"] and self.filter is not None:
             raise ValueError("'filter' belongs to an 'fmu', which it takes as its model")
+        if stated != ["fmu"] and self.units:
+            raise ValueError("'units' belong to an FMU, whose description may lack them")
         if stated != ["fmu"] and self.tolerance is not None:
             raise ValueError("'tolerance' belongs to an FMU; shipped models have the parameter 'internal_step' instead")
         if stated != ["recording"] and {"component", "interpolation"} & self.model_fields_set:

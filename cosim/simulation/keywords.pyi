@@ -6,6 +6,15 @@ from typing import Any, Literal, TypedDict
 
 import numpy as np
 
+class StatedUnitKeywords(TypedDict, total=False):
+    """What is known of a variable: ``value as usual = sign * value of the FMU + offset``, in the unit."""
+
+    unit: str | None
+    sign: Literal["1", "-1"]
+    offset: float
+    meaning: str | None
+    instead_of: str | None
+
 class FilterKeywords(TypedDict, total=False):
     """A filter over the FMU of its component."""
 
@@ -38,6 +47,7 @@ class ComponentKeywords(TypedDict, total=False):
     preset: str | None
     options: Mapping[str, Any]
     parameters: Mapping[str, Any]
+    units: Mapping[str, Any]
     tolerance: float | Literal["none"] | None
     late_policy: Literal["replay", "reject", "late"]
     replay_horizon: float

@@ -202,7 +202,7 @@ class _Exporter:
     def checked(self, fmu: Path, name: str, table: ComponentTable) -> ModelDescription:
         """The description of an FMU, arrays as its structural parameters make them, once its parameters fit."""
         try:
-            component = describe_fmu(fmu, name)
+            component = describe_fmu(fmu, name, table.units)
             seed = component_seed(component, table.parameters, self.table.seed)
             start_values(component, table.parameters | seed)
             self.seeds[name] = {} if self.table.seed == RUN_SEED else seed  # else the FMU finds the same by its name

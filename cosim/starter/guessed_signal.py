@@ -106,7 +106,7 @@ _NOT_THIS: Mapping[Quantity, Set[str]] = {
 }
 """Words that speak of another quantity of the same unit."""
 STRONG, WEAK, _SAID, MEASURED, _DENIED = 4, 3, 2, 3, -99
-_SURE, _LIKELY = 7, 4
+_SURE, _LIKELY, _STATED = 7, 4, 20
 
 
 @dataclass(frozen=True)
@@ -117,6 +117,7 @@ class GuessedSignal:
         name: its name. unit: name of its unit, or None. meaning: of the unit; None without one, or where nobody
             understands it.
         description: one line. start: its start value as a number, or None. type: of FMI.
+        stated: what the scenario says that it is, one of `UNITS` or other words; empty where it says nothing.
     """
 
     name: str
@@ -125,6 +126,7 @@ class GuessedSignal:
     description: str = ""
     start: float | None = None
     type: str = "Float64"
+    stated: str = ""
 
     @property
     def readable(self) -> bool:
@@ -191,6 +193,8 @@ def fits(signal: GuessedSignal, unit: str) -> bool:
 
 def _rate(quantity: Quantity, signal: GuessedSignal) -> tuple[int, str]:
     """How much speaks for a signal, 0 and less is nothing; and what."""
+    if signal.stated in UNITS:
+        return (_STATED if signal.stated == quantity else 0), "as it is stated"
     has_unit = any(fits(signal, unit) for unit in UNITS[quantity]) or (quantity == "slip" and signal.unit is None)
     if signal.meaning is not None and not has_unit:
         return 0, ""

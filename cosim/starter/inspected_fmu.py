@@ -4,7 +4,7 @@ executed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from cosim.components.component import Component
 from cosim.components.description import read_description, runs_here
 from cosim.components.loading import describe_fmu
+from cosim.components.stated_units import NONE_STATED, StatedUnit
 from cosim.errors import FmuLoadError
 from cosim.starter.guessed_signal import GuessedSignal
 from fmus.fmi.elements import elements_of
@@ -52,24 +53,24 @@ class InspectedFmu:
         return self.component.description
 
 
-def inspect_fmu(path: Path) -> InspectedFmu:
+def inspect_fmu(path: Path, units: Mapping[str, StatedUnit] = NONE_STATED) -> InspectedFmu:
     """Inspect an FMU.
 
     Args:
-        path: of the FMU.
+        path: of the FMU. units: what is stated of its variables, by name.
 
     Raises:
-        FmuLoadError: it is missing, broken, or not made for co-simulation.
+        FmuLoadError: it is missing, broken, or not made for co-simulation. CouplingError: `units` do not fit it.
     """
     _demand_co_simulation(path, read_description(path, path.name))
-    component = describe_fmu(path, NAME)
+    component = describe_fmu(path, NAME, units)
     found: dict[str, list[GuessedSignal]] = {"input": [], "output": [], "parameter": [], "local": []}
     unread: list[str] = []
     hidden = component.event_references()
     for variable in component.description.modelVariables:
         if variable.causality not in found or variable.valueReference in hidden:
             continue
-        signals = _signals(component, variable)
+        signals = _signals(component, variable, units.get(variable.name))
         found[variable.causality] += signals
         if not signals and variable.causality in ("input", "output"):
             unread.append(_unread(variable))
@@ -90,7 +91,7 @@ def _demand_co_simulation(path: Path, description: ModelDescription) -> None:
     )
 
 
-def _signals(component: Component, variable: ModelVariable) -> list[GuessedSignal]:
+def _signals(component: Component, variable: ModelVariable, fact: StatedUnit | None) -> list[GuessedSignal]:
     if variable.type not in NUMERIC_TYPES:
         return []
     elements = elements_of(variable) if variable.shape else [None]
@@ -103,10 +104,9 @@ def _signals(component: Component, variable: ModelVariable) -> list[GuessedSigna
         meaning = None
     start = None if variable.shape else number(variable.start)
     names = [variable.name if element is None else element.name for element in elements]
-    description = variable.description or ""
-    return [
-        GuessedSignal(name, unit, meaning if unit else None, description, start, str(variable.type)) for name in names
-    ]
+    description, stated = variable.description or "", (fact and fact.meaning) or ""
+    known = (unit, meaning if unit else None, description, start, str(variable.type), stated)
+    return [GuessedSignal(name, *known) for name in names]
 
 
 def number(text: Any) -> float | None:

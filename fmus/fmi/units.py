@@ -91,8 +91,16 @@ class Units:
         name = self.name(variable)
         if name is None:
             return None
-        unit = self._defined(name) or parse_unit(name)
+        unit = self.meaning(name)
         return replace(unit, offset=0.0) if _is_relative(variable) else unit
+
+    def meaning(self, name: str) -> Unit:
+        """What a unit name stands for, by the description's own definition or else as everybody understands it.
+
+        Raises:
+            UnitError: nothing defines it.
+        """
+        return self._defined(name) or parse_unit(name)
 
     def named(self, variable: ModelVariable) -> NamedUnit | None:
         """The unit of a variable with its name, or None where it declares none."""

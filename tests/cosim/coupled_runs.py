@@ -199,7 +199,9 @@ def execution_order(components: Mapping[str, Component], connections: Sequence[A
 def _service(plan: Plan, balises: Balises) -> BaliseService:
     planned = plan.find(balises.plant)
     names = planned.component.names("output")
-    watch = PlantMonitor(planned, names.index("position"), names.index("speed"), balises.scale, balises.scale)
+    watch = PlantMonitor(
+        planned, names.index("position"), names.index("speed"), (balises.scale, 0.0), (balises.scale, 0.0)
+    )
     localiser = make_localiser(balises.method, watch, balises.layout, balises.clock)
     receivers = [Receiver(plan.find(name), timing=balises.timing) for name in balises.receivers]
     odometer = None if balises.odometer is None else plan.column(balises.odometer)

@@ -27,6 +27,16 @@ def test_words_of_a_name(text: str, words: list[str]) -> None:
     assert _words_of(text) == words
 
 
+def test_a_stated_meaning_decides() -> None:
+    """Over names, units and descriptions that speak for another one."""
+    misleading = GuessedSignal("y7", stated="speed")
+    named = signal("v_train", "m/s", "speed of the train")
+    found = guess("speed", [named, misleading])
+    assert found is not None
+    assert (found.signal, found.sureness) == (misleading, "sure")
+    assert guess("position", [GuessedSignal("s", stated="speed")]) is None
+
+
 NAMED: list[tuple[Quantity, str, str | None]] = [
     ("position", "Position", "m"),
     ("position", "train.s", "m"),
