@@ -54,8 +54,8 @@ SHARED: dict[int, float] = {}
 SEED = "FMU_OBSERVER_TEST_SAMPLE"
 """Variable of the environment: what draws the sample; the digest of the product unless it is set."""
 OF_FIRST, OF_SECOND, OF_UNCHANGED = 16, 4, 16
-"""One in so many is in the sample: of the tests of the first tier; of the cases of a law that the first tier has too;
-of pages and sheets that follow from nothing that changed."""
+"""One in so many is in the sample: of the tests of the first tier; of the cases of a law of the second; of pages and
+sheets that follow from nothing that changed."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -188,23 +188,26 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _sample(items: Iterable[pytest.Item], seed: str) -> Iterator[pytest.Item]:
-    """Of the first tier some tests, of each file one at least. Of the second what has no part in the first, some of
-    what has, with all laws of the systems drawn, and the pages and sheets that follow from something that changed.
+    """Of the first tier some tests, of each file one at least. Of the second, of each law the cases of the systems that
+    are drawn, and one at least where the first has none; and pages and sheets that follow from something that changed.
     """
-    first, second = defaultdict(list), []
+    first, second = defaultdict(list), defaultdict(list)
     for item in items:
-        slow = item.get_closest_marker("slow")
-        second.append(item) if slow else first[tiers.parts(item.nodeid)[0]].append(item)
+        file, law, _ = tiers.parts(item.nodeid)
+        if item.get_closest_marker("follows"):
+            if tiers.has_changed(item.nodeid) or tiers.is_drawn(item.nodeid, seed, OF_UNCHANGED):
+                yield item
+        elif item.get_closest_marker("slow"):
+            second[file, law].append(item)
+        else:
+            first[file].append(item)
     for of_a_file in first.values():
         drawn = [item for item in of_a_file if tiers.is_drawn(item.nodeid, seed, OF_FIRST)]
         yield from drawn or of_a_file[-1:]  # the first of a file pays for what the others share
     laws = {tiers.parts(item.nodeid)[:2] for of_a_file in first.values() for item in of_a_file}
-    for item in second:
-        if item.get_closest_marker("follows"):
-            if tiers.has_changed(item.nodeid) or tiers.is_drawn(item.nodeid, seed, OF_UNCHANGED):
-                yield item
-        elif tiers.parts(item.nodeid)[:2] not in laws or tiers.is_drawn(_system(item), seed, OF_SECOND):
-            yield item
+    for law, cases in second.items():
+        drawn = [item for item in cases if tiers.is_drawn(_system(item), seed, OF_SECOND)]
+        yield from drawn or ([] if law in laws else cases[-1:])
 
 
 def _system(item: pytest.Item) -> str:
