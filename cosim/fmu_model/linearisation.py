@@ -101,7 +101,8 @@ class Linearisation(Readable):
         lengths = np.linalg.norm(rows, axis=1)
         seen = rows[lengths > 0.0] / lengths[lengths > 0.0, None]
         nothing = np.zeros((1, len(A)))
-        return MeasuredSystem(balanced, seen if len(seen) else nothing, states=self.states, name=self.name)
+        measured = seen if len(seen) else nothing
+        return MeasuredSystem(balanced, measured, states=self.states, name=self.name, step=self.step)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain data, eigenvalues as pairs of real and imaginary part."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from math import inf, isfinite
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,10 @@ from fmus.check.finite_differences import RELATIVE_STEP, compare
 
 Array = NDArray[np.float64]
 _HELD_TYPES = ("Real", "Float64", "Float32")
+_LENGTHS = (1.0, 1e2, 1e4)
+"""Of differences over a step of co-simulation, in shortest ones."""
+_AGREE = 1e-2
+"""Share of the largest slope of a column by which slopes over two lengths may differ: more is a solver's noise."""
 MOST_NAMED = 6
 """Names of held variables in a sentence."""
 Function = Callable[[Array, Array], tuple[Array, Array]]  # (states, inputs) -> (rates or next states, outputs)
@@ -154,12 +159,14 @@ def _continuous(model: ExchangeModel, t: float) -> Function:
 
 
 def _sampled(model: SealedModel, t: float, step: float) -> Function:
-    """The states a step later, and the outputs before it."""
+    """The states a step later, and the outputs before it.
+
+    Each from a restart of its own: an FMU may forget states that were set when it is read before the step.
+    """
 
     def function(x: Array, u: Array) -> tuple[Array, Array]:
         _, y = model.values_at(t, x, u)
-        model.advance(t, step)
-        return model.read()[0], y
+        return model.transition(t, step, x, u)[0], y
 
     return function
 
@@ -221,25 +228,50 @@ def _jacobian(model: SealedModel, function: Function, x: Array, u: Array) -> tup
             if whole is not None:
                 return whole, "directional derivatives", []
             remarks.append(objection)
-    remarks.append(
-        f"Central differences with steps of {RELATIVE_STEP:g} of the value or the nominal size, the larger of both."
-    )
-    return _differences(model, function, x, u), "central differences", remarks
+    whole, more = _differences(model, function, x, u)
+    return whole, "central differences", remarks + more
 
 
-def _differences(model: SealedModel, function: Function, x: Array, u: Array) -> Array:
-    """Jacobian of rates and outputs by states and inputs, shape (n + q, n + m)."""
+def _differences(model: SealedModel, function: Function, x: Array, u: Array) -> tuple[Array, list[str]]:
+    """Jacobian of rates and outputs by states and inputs, shape (n + q, n + m), and remarks.
+
+    A solver in the FMU may not resolve a short difference: there slopes over longer ones are compared, and the shortest
+    is taken that the next one confirms.
+    """
     at, n = np.concatenate([x, u]), len(x)
-    columns = []
+    lengths = (1.0,) if isinstance(model, ExchangeModel) else _LENGTHS
+    columns, coarse = [], []
     for i, name in enumerate((*model.states, *model.inputs)):
-        size = RELATIVE_STEP * max(abs(at[i]), model.nominal(name))
-        above, below = at.copy(), at.copy()
-        above[i] += size
-        below[i] -= size
-        ends = [np.concatenate(function(z[:n], z[n:])) for z in (above, below)]
-        columns.append((ends[0] - ends[1]) / (above[i] - below[i]))
+        shortest = RELATIVE_STEP * max(abs(at[i]), model.nominal(name))
+        slopes = [_slope(function, at, i, n, length * shortest) for length in lengths]
+        found = next((one for one, next_one in pairwise(slopes) if _resolved(one, next_one, slopes[-1])), slopes[-1])
+        coarse += [name] if found is slopes[-1] and len(slopes) > 1 else []
+        columns.append(found)
     function(x, u)
-    return np.array(columns).T.reshape(n + len(model.outputs), len(at))
+    remarks = [
+        f"Central differences with steps of {RELATIVE_STEP:g} of the value or the nominal size, the larger of both."
+    ]
+    if coarse:
+        remarks.append(
+            f"Slopes along {_some(coarse)} depend on the length of the difference: the FMU's own solver is too coarse, "
+            "or it has a kink here. Do not rely on these columns; set a finer tolerance, or try a point beside it."
+        )
+    return np.array(columns).T.reshape(n + len(model.outputs), len(at)), remarks
+
+
+def _resolved(slope: Array, longer: Array, longest: Array) -> bool:
+    """Whether slopes over a longer difference agree, and none is zero only because nothing so short is seen."""
+    most = _AGREE * np.abs(longest).max(initial=0.0)
+    return bool(((np.abs(longer - slope) <= most) & ((slope != 0.0) | (np.abs(longest) <= most))).all())
+
+
+def _slope(function: Function, at: Array, i: int, n: int, size: float) -> Array:
+    """Central difference of rates and outputs along one of states and inputs, shape (n + q,)."""
+    above, below = at.copy(), at.copy()
+    above[i] += size
+    below[i] -= size
+    ends = [np.concatenate(function(z[:n], z[n:])) for z in (above, below)]
+    return np.asarray((ends[0] - ends[1]) / (above[i] - below[i]))
 
 
 def _directional(model: ExchangeModel, function: Function, x: Array, u: Array) -> tuple[Array | None, str]:

@@ -1,5 +1,5 @@
-"""A linear system and how it is measured: ``dx = A x``, continuously ``C_continuous x``, at instants ``C_sampled x``. A
-value.
+"""A linear system and how it is measured: ``dx = A x``, continuously ``C_continuous x``, at instants ``C_sampled x``;
+or the same from one step to the next. A value.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class MeasuredSystem:
         states: names of the states; ``x1`` ... ``xn`` where none are matrix.
         scales: a typical size of each state, so that states of different units can be compared, shape (n,); 1 where not
             matrix.
-        name: for messages.
+        name: for messages. step: length [s] of the step over which A leads; 0 where it is that of ``dx = A x``.
 
     Raises:
         ValueError: a shape does not fit, a number is not finite, a scale is not positive, or nothing is measured.
@@ -33,6 +33,7 @@ class MeasuredSystem:
     states: Sequence[str] = ()
     scales: Sequence[float] | np.ndarray = ()
     name: str = "system"
+    step: float = 0.0
 
     def __post_init__(self) -> None:
         A = np.array(self.A, dtype=float)
@@ -75,5 +76,10 @@ class MeasuredSystem:
         """The same system in states divided by their scales."""
         S, inverse = np.diag(self.scales), np.diag(1.0 / np.asarray(self.scales))
         return MeasuredSystem(
-            inverse @ self.A @ S, self.C_continuous @ S, self.C_sampled @ S, self.states, name=self.name
+            inverse @ self.A @ S,
+            self.C_continuous @ S,
+            self.C_sampled @ S,
+            self.states,
+            name=self.name,
+            step=self.step,
         )

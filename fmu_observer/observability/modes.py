@@ -45,13 +45,14 @@ class Mode:
     """A mode that is not seen.
 
     Attributes:
-        eigenvalue: [1/s]; of a conjugate pair the one with positive imaginary part.
+        eigenvalue: [1/s], or factor by step [1]; of a conjugate pair the one with positive imaginary part.
         vector: its eigenvector in the units of the states, largest entry (relative to the scales) real and positive,
         shape (n,).
         states: names of the states, in the order of `vector`.
         shares: sizes of the entries relative to the scales, the largest 1, shape (n,).
         chain: 1 for an eigenvector; 2 or more for a direction that moves into the one before it in a chain of
             integrators, and so grows as t.
+        step: length of the step [s] of which the eigenvalue is the factor; 0 in continuous time.
     """
 
     eigenvalue: complex
@@ -59,6 +60,7 @@ class Mode:
     states: tuple[str, ...]
     shares: np.ndarray
     chain: int = 1
+    step: float = 0.0
 
     @property
     def taking_part(self) -> dict[str, complex]:
@@ -66,21 +68,31 @@ class Mode:
         return {name: self.vector[i] for i, name in enumerate(self.states) if self.shares[i] >= _PART}
 
     @property
+    def exponent(self) -> complex:
+        """The eigenvalue in continuous time [1/s]; of a factor by step the slowest one that gives it."""
+        if not self.step:
+            return self.eigenvalue
+        return complex(np.log(self.eigenvalue)) / self.step if self.eigenvalue else complex(-np.inf)
+
+    @property
     def decays(self) -> bool:
-        """Whether the mode dies out by itself; one of eigenvalue zero does not."""
-        return bool(self.eigenvalue.real < 0.0)
+        """Whether the mode dies out by itself; an offset does not."""
+        return bool(self.exponent.real < 0.0)
 
     def explain(self) -> str:
         """The mode in words: eigenvalue, period, time constant, states."""
-        rate, frequency = self.eigenvalue.real, self.eigenvalue.imag
-        words = [f"period {2.0 * np.pi / frequency:.4g} s"] if frequency else []
-        if rate:
+        rate, frequency = self.exponent.real, self.exponent.imag
+        words = [f"period {2.0 * np.pi / abs(frequency):.4g} s"] if frequency else []
+        if np.isinf(rate):
+            words.append("gone after a step")
+        elif rate:
             words.append(f"{'decays' if rate < 0.0 else 'grows'} with time constant {1.0 / abs(rate):.4g} s")
         elif not frequency:
             words.append("an offset that stays" if self.chain == 1 else "an offset that others integrate")
-        value = f"{rate:.4g}" + (f" +- {frequency:.4g}i" if frequency else "")
+        value = f"{self.eigenvalue.real:.4g}" + (f" +- {self.eigenvalue.imag:.4g}i" if self.eigenvalue.imag else "")
+        unit = "" if self.step else " 1/s"
         parts = ", ".join(f"{name} ({self.shares[self.states.index(name)]:.3g})" for name in self.taking_part)
-        return f"eigenvalue {value} 1/s ({', '.join(words) or 'neither decays nor grows'}), in the states {parts}"
+        return f"eigenvalue {value}{unit} ({', '.join(words) or 'neither decays nor grows'}), in the states {parts}"
 
 
 def unobservable_modes(system: MeasuredSystem, tolerance: float = _RANK_TOLERANCE) -> list[Mode]:
@@ -93,12 +105,13 @@ def unobservable_modes(system: MeasuredSystem, tolerance: float = _RANK_TOLERANC
         The modes, the least stable first; one of each conjugate pair.
     """
     scaled = system.scaled()
-    basis = unobservable_subspace(scaled.A, scaled.C, tolerance).basis
+    A = scaled.A - np.eye(len(scaled.A)) if system.step else scaled.A  # what changes; an offset has the eigenvalue zero
+    basis = unobservable_subspace(A, scaled.C, tolerance).basis
     if not basis.shape[1]:
         return []
-    inner = basis.T @ scaled.A @ basis
+    inner = basis.T @ A @ basis
     values, vectors = np.linalg.eig(inner)
-    norm = _norm(scaled.A)  # what rounding in `inner` is relative to; `inner` itself may be nothing but rounding
+    norm = _norm(A)  # what rounding in `inner` is relative to; `inner` itself may be nothing but rounding
     zeros = _zero_cluster(values, norm)
     chains = _integrators(inner / (norm or 1.0), len(zeros), tolerance)
     modes = [_mode(system, 0j, basis @ column, place) for column, place in chains]
@@ -106,7 +119,7 @@ def unobservable_modes(system: MeasuredSystem, tolerance: float = _RANK_TOLERANC
         value = _without_rounding(complex(values[i]), tolerance * norm)
         if value.imag >= 0.0:
             modes.append(_mode(system, value, basis @ vectors[:, i]))
-    return sorted(modes, key=lambda mode: -mode.eigenvalue.real)
+    return sorted(modes, key=lambda mode: -mode.exponent.real)
 
 
 def undetectable_modes(system: MeasuredSystem, tolerance: float = _RANK_TOLERANCE) -> list[Mode]:
@@ -188,7 +201,9 @@ def _mode(system: MeasuredSystem, value: complex, scaled_vector: np.ndarray, cha
     vector = turned * system.scales
     if not np.iscomplexobj(vector) or np.abs(vector.imag).max() <= _PART * np.abs(vector).max():
         vector = vector.real
-    return Mode(value, vector / np.abs(vector[largest]), tuple(system.states), shares / shares[largest], chain)
+    vector = vector / np.abs(vector[largest])
+    eigenvalue = 1.0 + value if system.step else value
+    return Mode(eigenvalue, vector, tuple(system.states), shares / shares[largest], chain, system.step)
 
 
 def _zero_cluster(values: np.ndarray, norm: float) -> list[int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
@@ -70,6 +71,38 @@ def test_an_oscillation_is_reported_once_with_its_period() -> None:
     require_detectable(system)
     with pytest.raises(UnobservableError, match=r"mode that no measurement shows: eigenvalue -0\.1 \+- 2i 1/s"):
         require_observable(system)
+
+
+@pytest.mark.parametrize(
+    ("A", "said"),
+    [
+        (0.9, "eigenvalue 0.9 (decays with time constant 0.9491 s)"),
+        (1.0, "eigenvalue 1 (an offset that stays)"),
+        (1.1, "eigenvalue 1.1 (grows with time constant 1.049 s)"),
+        (0.0, "eigenvalue 0 (gone after a step)"),
+        (-0.5, "eigenvalue -0.5 (period 0.2 s, decays with time constant 0.1443 s)"),
+    ],
+)
+def test_a_factor_by_step_is_read_as_one(A: float, said: str) -> None:
+    (mode,) = unobservable_modes(MeasuredSystem(np.diag([A, 0.3]), [[0.0, 1.0]], step=0.1))
+    assert mode.explain() == f"{said}, in the states x1 (1)"
+    assert mode.decays == (abs(A) < 1.0)
+
+
+@settings(deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), step=st.floats(1e-3, 1.0))
+def test_modes_from_step_to_step_are_those_of_continuous_time(seed: int, step: float) -> None:
+    """The exponential of A has the eigenvectors of A, and its factors have the time constants of A."""
+    random = np.random.default_rng(seed)
+    hidden, shift = random.normal(size=(2, 2)), random.normal(size=(2, 2))
+    A = block_diag(hidden, [[-1.0]]) / max(1.0, float(np.linalg.norm(hidden)))
+    A[:2, 2:] = shift[:, :1]
+    C = [[0.0, 0.0, 1.0]]
+    continuous = unobservable_modes(MeasuredSystem(A, C))
+    sampled = unobservable_modes(MeasuredSystem(scipy.linalg.expm(step * A), C, step=step))
+    assert len(continuous) == len(sampled)
+    found, expected = (np.sort_complex([mode.exponent for mode in modes]) for modes in (sampled, continuous))
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 / step)
 
 
 @pytest.mark.parametrize("turned", [False, True])

@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import lying_fmus
 import numpy as np
@@ -17,7 +18,7 @@ from cosim import fmu_model
 from cosim.cli import main
 from cosim.fmu_model.exact import linearise_system
 from cosim.fmu_model.linearisation import Linearisation
-from cosim.fmu_model.linearise import linearise_fmu
+from cosim.fmu_model.linearise import _differences, _sampled, linearise_fmu
 from cosim.fmu_model.sealed import FmuModelError
 from plant_models import PLANTS
 
@@ -166,6 +167,45 @@ def test_mistakes_are_reported(
 def test_a_model_without_states_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["linearise", "inverter"]) == 2
     assert "inverter: it has no continuous states" in capsys.readouterr().err
+
+
+class Stepped:
+    """A co-simulation of dx = -x, whose solver resolves so much of a state, and which forgets what is read too early.
+
+    Args:
+        resolution: of the state.
+    """
+
+    states, inputs, outputs = ("x",), (), ("y",)
+
+    def __init__(self, resolution: float) -> None:
+        self.resolution, self.x = resolution, 0.0
+
+    def nominal(self, _name: str) -> float:
+        return 1.0
+
+    def values_at(self, _t: float, x: np.ndarray, _u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        self.x = 0.0  # read before a step it forgets what was set
+        return x, 2.0 * x
+
+    def advance(self, _t: float, h: float) -> None:
+        self.x *= np.exp(-h)
+
+    def transition(self, t: float, h: float, x: np.ndarray, _u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        self.x = np.round(x[0] / self.resolution) * self.resolution if self.resolution else x[0]
+        self.advance(t, h)
+        return self.read()
+
+    def read(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([self.x]), np.array([2.0 * self.x])
+
+
+@pytest.mark.parametrize(("resolution", "coarse"), [(0.0, False), (1e-9, False), (3e-7, False), (7e-3, True)])
+def test_slopes_shorter_than_a_solver_resolves_are_not_believed(resolution: float, coarse: bool) -> None:
+    model: Any = Stepped(resolution)
+    found, remarks = _differences(model, _sampled(model, 0.0, 0.1), np.array([1.0]), np.zeros(0))
+    assert any("too coarse" in remark for remark in remarks) == coarse
+    np.testing.assert_allclose(found, [[np.exp(-0.1)], [2.0]], rtol=0.1)
 
 
 def test_samples_of_an_fmu_are_reported(locomotive: Path) -> None:
