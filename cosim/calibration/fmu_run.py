@@ -23,7 +23,7 @@ from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
 from cosim.runs.job import Job
 from cosim.runs.keys import digest, version_text
 from cosim.scenario.origin import ForeignFile
-from fmus.fmi.types import is_continuous
+from fmus.fmi.types import is_continuous, why_not_set
 from fmus.fmi.units import NamedUnit, Units
 from plant_models.disk_cache.files import file_digest
 
@@ -139,10 +139,9 @@ class ReadSignals(_FmuJob):
             )
 
     def _demand_settable(self, name: str, variable: Any) -> None:
-        if variable.causality in ("output", "independent", "calculatedParameter") or variable.variability == "constant":
+        if objection := why_not_set(variable):
             raise CalibrationError(
-                f"{name!r} cannot be set (causality {variable.causality}, variability {variable.variability}); "
-                "expected a parameter or the start value of a state."
+                f"{name!r} cannot be set: it {objection}; expected a parameter or the start value of a state."
             )
 
 

@@ -15,7 +15,7 @@ from fmu_observer.annotated_variable import can_be_missing
 from fmus.fmi import described as fmi
 from fmus.fmi.elements import Element, described
 from fmus.fmi.standard import OWN_TOOL
-from fmus.fmi.types import FLOATING_TYPES
+from fmus.fmi.types import FLOATING_TYPES, why_not_set
 from fmus.fmi.units import NamedUnit, Units
 from plant_models.hybrid.units import Unit, UnitError
 
@@ -175,11 +175,8 @@ class DescribedComponent(fmi.Described):
             CouplingError: there is none, or it cannot be set.
         """
         variable = self.variable(name)
-        if variable.causality in ("output", "independent", "calculatedParameter") or variable.variability == "constant":
-            what = "is constant" if variable.variability == "constant" else f"has causality '{variable.causality}'"
-            raise CouplingError(f"{self.name}.{name} cannot be set: it {what}.")
-        if variable.type == "Clock":
-            raise CouplingError(f"{self.name}.{name} cannot be set: it is a Clock, which ticks by itself or at events.")
+        if objection := why_not_set(variable):
+            raise CouplingError(f"{self.name}.{name} cannot be set: it {objection}.")
         return variable
 
     @cached_property

@@ -15,18 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.components.description import open_fmu
-from cosim.components.loading import load_fmu
 from cosim.components.stated_units import NONE_STATED, StatedUnit
 from cosim.errors import nearest
 from cosim.fmu_filter.belief import ExtendedFilter, FmuFilter, Noises, UnscentedFilter
 from cosim.fmu_filter.journal import EQUAL_WITHIN, FilterJournal
 from cosim.fmu_filter.many import EnsembleFilter, FmuParticleFilter
 from cosim.fmu_filter.settings import FilterTable
-from cosim.fmu_model.exchange import ExchangeModel
 from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_saving, check_states, usual_step
-from fmus.check.probe import probe
 from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.noise import FROM_NAME, RUN_SEED, seed_of
 from plant_models.hybrid.signal import Signal, input_signal, output_signal
@@ -69,7 +66,7 @@ class FmuFilterModel:
         self._model = _opened(path, table, numbers, units)
         model = self._model
         if not checked:
-            _demand(table, model, numbers)
+            _demand(table, model)
         self._start = model.start.copy()
         self._seen = [_place(model, "output", model.outputs, name) for name in table.measurements]
         self._R = np.diag([value**2 for value in table.measurements.values()])
@@ -262,20 +259,13 @@ def _opened(
     return open_model(path, table.interface, states=states, outputs=table.outputs, parameters=settings, units=units)
 
 
-def _demand(table: FilterTable, model: SealedModel, parameters: Mapping[str, float]) -> None:
+def _demand(table: FilterTable, model: SealedModel) -> None:
     """Refuse an FMU of which a measurement says that it cannot serve this filter."""
     h = usual_step(model)
     if table.kind != "particle":
         check_states(model, h)
         return
-    if isinstance(model, ExchangeModel):
-        check_saving(model, h)
-    elif (seen := probe(lambda: load_fmu(model.path, "probed"), parameters, 0.0, h)).restores == "no":
-        found = "; ".join(seen.remarks) or "it does not declare canGetAndSetFMUState"
-        raise FmuModelError(
-            f"{model.path}: its states cannot be saved and restored honestly ({found}), so no particle filter can "
-            "select among them. Use 'ekf', 'ukf' or 'ensemble' where its states have start values."
-        )
+    check_saving(model, h)
     if not any((*table.start_deviation.values(), *table.input_noise.values())):
         raise FmuModelError(
             f"{model.path}: nothing moves the particles apart: give 'start_deviation' (start values, parameters too) "

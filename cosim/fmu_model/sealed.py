@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from cosim.errors import CosimError, nearest
 from fmus.check.checked_instance import SlaveError
 from fmus.fmi.instance import Instance
+from fmus.fmi.types import why_not_set
 
 Array = NDArray[np.float64]
 Way = Literal["restart", "step mode", "exchange"]
@@ -68,7 +69,7 @@ class SealedModel(ABC):
         self.outputs = tuple(self._chosen(outputs, real_names(instance, "output"), "output"))
         self.inputs = tuple(self._chosen(inputs, real_names(instance, "input"), "input"))
         self.parameters = dict(parameters or {})
-        self._chosen(list(self.parameters), [], "parameter")
+        self._demand_starts()
         self.called(instance.instantiate)
         self._states_read, self._outputs_read = np.zeros(len(self.states)), np.zeros(len(self.outputs))
         self._read_states = instance.reader(list(self.states), self._states_read)
@@ -274,6 +275,11 @@ class SealedModel(ABC):
                 raise FmuModelError(f"{self.path}: no {what} {name!r}; {hint}") from error
         return stated
 
+    def _demand_starts(self) -> None:
+        for name in self._chosen(list(self.parameters), [], "parameter"):
+            if objection := why_not_set(self.instance.variables.element(name).variable):
+                raise FmuModelError(f"{self.path}: {name} cannot be set: it {objection}.")
+
     def _own_states(self, stated: Sequence[str] | None) -> Sequence[str]:
         return self._chosen(stated, declared_states(self.instance), "state")
 
@@ -316,20 +322,24 @@ def real_names(instance: Instance, causality: str) -> list[str]:
 
 
 def declared_states(instance: Instance) -> list[str]:
-    """Names of the continuous states that a model description declares: variables that have a derivative.
+    """Names of the continuous states that a model description declares, in the order of the state vector.
+
+    They are counted by its ModelStructure: an output that aliases a state may have a derivative too. Co-simulation may
+    leave that list out; then every variable with a derivative is a state, aliases once.
 
     Args:
         instance: of the FMU.
     """
     description = instance.description
-    rates = [unknown.variable for unknown in description.derivatives]  # in the order of the state vector
-    rates += [variable for variable in description.modelVariables if variable.derivative is not None]
-    names: list[str] = []
-    for rate in rates:
-        if rate.derivative is not None:
-            found = [element.name for element in instance.variables.expanded(rate.derivative.name)]
-            names += [name for name in found if name not in names]
-    return names
+    rates = [unknown.variable for unknown in description.derivatives]
+    if not rates:
+        rates = [variable for variable in description.modelVariables if variable.derivative is not None]
+    found = [rate.derivative for rate in rates if rate.derivative is not None]
+    if not description.derivatives:
+        first = {(state.type, state.valueReference): state for state in reversed(found)}
+        found = [state for state in found if first[state.type, state.valueReference] is state]
+    names = [element.name for state in found for element in instance.variables.expanded(state.name)]
+    return list(dict.fromkeys(names))
 
 
 def _put_away(instance: Instance, folder: Path) -> None:

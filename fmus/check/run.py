@@ -23,7 +23,7 @@ from fmus.check.runner import end_of_experiment
 from fmus.fmi.archive import Archive, NotAnFmuError, open_archive
 from fmus.fmi.instance import INSTANTIATING
 from fmus.fmi.standard import CO_SIMULATION, SCHEDULED_EXECUTION
-from fmus.fmi.types import NUMERIC_TYPES
+from fmus.fmi.types import NUMERIC_TYPES, why_not_set
 from plant_models.registry import log_left_out
 from plant_models.user_file import UserFileError, name_of
 
@@ -38,7 +38,6 @@ WHOLE = 1e-6
 
 _UNRUNNABLE = (f"{LOADING} failed", f"{INSTANTIATING} failed")
 _NO_SLAVE = "there is no co-simulation: this package's master cannot step it"
-_UNSETTABLE = frozenset({"output", "independent", "calculatedParameter"})
 _STATIC = {"validation": validation, "platforms": platforms}
 
 
@@ -247,8 +246,8 @@ def _demand_settable(description: ModelDescription, starts: Mapping[str, float])
             near = get_close_matches(name, list(variables), 3, 0.5)
             hint = f"; did you mean {', '.join(map(repr, near))}?" if near else ""
             raise ValueError(f"There is no variable {name!r} to set{hint}")
-        if found.causality in _UNSETTABLE or found.variability == "constant":
-            raise ValueError(f"{name} cannot be set: it is '{found.causality}' and '{found.variability}'.")
+        if objection := why_not_set(found):
+            raise ValueError(f"{name} cannot be set: it {objection}.")
         if found.type not in NUMERIC_TYPES or found.shape:
             raise ValueError(
                 f"{name} cannot be set: it is a {found.type}{list(found.shape or ())}; only scalar numbers can."

@@ -56,6 +56,29 @@ def is_continuous(variable: ModelVariable) -> bool:
     return variable.type in FLOATING_TYPES and variable.variability in (None, "continuous")
 
 
+def why_not_set(variable: ModelVariable) -> str:
+    """What forbids to set a value of a variable before initialisation; empty where nothing does.
+
+    A state may be an output: where its start is exact or approximate it is set as a local one is (FMI 2.0.5, 2.2.7;
+    FMI 3.0.2, 2.4.7.5). FMI 1.0 knows no such word; there a declared start says it.
+
+    Args:
+        variable: of a description.
+    """
+    if variable.variability == "constant":
+        return "is constant"
+    if variable.type == "Clock":
+        return "is a Clock, which ticks by itself or at events"
+    if variable.causality == "independent":
+        return "has causality 'independent'"
+    starts = variable.initial in ("exact", "approx") or (variable.initial is None and variable.start is not None)
+    if variable.causality in ("output", "calculatedParameter") and not starts:
+        return f"has causality '{variable.causality}'" + (
+            f" and is {variable.initial}" if variable.initial else " and no start value"
+        )
+    return ""
+
+
 def getter_type(kind: str, fmi_version: int) -> str:
     """The type in the name of the functions that read and write a variable type.
 

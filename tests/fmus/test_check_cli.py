@@ -75,7 +75,6 @@ def test_json_in_place_of_the_table(honest: Path, capsys: Output) -> None:
         (["--start", "forse=1"], "There is no variable 'forse' to set; did you mean 'force'?"),
         (["--start", "force"], "write it as name=number"),
         (["--start", "force=strong"], "--start force: expected a number, such as 0.1"),
-        (["--start", "position=1"], "position cannot be set: it is 'output'"),
         (["--step", "0"], "must be positive and finite"),
         (["--timeout", "-1"], "must be positive and finite"),
         (["--steps", "0"], "must have a step at least"),

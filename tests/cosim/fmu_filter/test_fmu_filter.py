@@ -259,8 +259,16 @@ def test_particles_of_saved_states_find_start_and_input(path: Path) -> None:
 def test_particles_need_honest_states(tmp_path: Path) -> None:
     path = linear_fmu(tmp_path, "mass", [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], [[0]], inputs=["force"], state=False)
     table = FilterTable.model_validate({"kind": "particle", "measurements": {"y1": 0.1}})
-    with pytest.raises(FmuModelError, match=r"cannot be saved and restored honestly \(it does not declare"):
+    with pytest.raises(FmuModelError, match="does not declare that its state can be saved and restored"):
         FmuFilterModel(path, table)
+
+
+def test_particles_serve_an_fmu_that_allows_one_instance_in_a_process(tmp_path: Path) -> None:
+    """Nothing else is said against it: what is saved and restored is seen on the instance itself."""
+    masses = [[0, 1], [0, 0]], [[0], [1]], [[1, 0]], [[0]]
+    path = linear_fmu(tmp_path, "mass", *masses, inputs=["force"], once_per_process=True)
+    noises = {"start_deviation": {"x0[1]": 1.0}, "members": 5}
+    FmuFilterModel(path, FilterTable.model_validate({"kind": "particle", "measurements": {"y1": 0.1}, **noises}))
 
 
 def test_particles_need_something_that_moves_them_apart(tmp_path: Path) -> None:

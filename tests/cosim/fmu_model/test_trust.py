@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -210,6 +211,35 @@ def test_saved_states_of_model_exchange_are_measured(tmp_path: Path, monkeypatch
     with pytest.raises(FmuModelError, match=r"restored and stepped again, position is .* restored honestly"):
         check_saving(model, 0.01)
     model.close()
+
+
+def test_half_a_restored_state_is_found_in_co_simulation(tmp_path: Path) -> None:
+    honest, forgetful = (
+        open_model(lying_fmus.build(tmp_path / f"l{len(lies)}", *lies), states=()) for lies in ((), ("HALF_RESTORED",))
+    )
+    check_saving(honest, 0.01)
+    with pytest.raises(FmuModelError, match=r"restored and stepped again, \w+ is .* restored honestly"):
+        check_saving(forgetful, 0.01)
+    honest.close()
+    forgetful.close()
+
+
+def test_states_are_counted_by_the_model_structure(tmp_path: Path) -> None:
+    """An output that aliases a state has a derivative as well: it is no state of its own."""
+    alias = """<ScalarVariable name="shown" valueReference="2" causality="output" variability="continuous"
+      initial="calculated"><Real/></ScalarVariable>
+      <ScalarVariable name="der(shown)" valueReference="3" causality="local" variability="continuous"
+      initial="calculated"><Real derivative="8"/></ScalarVariable></ModelVariables>"""
+    xml = lying_fmus.description(model=lying_fmus.STATES).replace("</ModelVariables>", alias)
+    interfaces: tuple[Interface, Interface] = ("co-simulation", "model-exchange")
+    for structure, orders in ((True, ("position", "speed")), (False, ("speed", "position"))):
+        listed = xml if structure else re.sub("<Derivatives>.*</Derivatives>", "", xml)
+        path = lying_fmus.build(tmp_path / str(structure), xml=listed)
+        for interface in interfaces if structure else interfaces[:1]:
+            model = open_model(path, interface)
+            assert model.states == orders
+            assert check_states(model, 0.01).exact
+            model.close()
 
 
 def test_a_discrete_observer_has_no_states_to_move() -> None:
