@@ -206,6 +206,7 @@ class Program:
         made = CSlave(instance=instance, fmi_version=component.fmi_version)
         made.do_step = self.function(component, f"fmi{component.fmi_version}DoStep")
         made.numbers = LAST_CALL.numbers(component.name)
+        made.usual_step, made.rounding = component.usual_step, component.rounding
         made.heeds_events = bool(getattr(component, "has_event_mode", False))
         writes, names = self._ports(component, "Set", inputs.names, inputs.buffer)
         self.writes.append(names)

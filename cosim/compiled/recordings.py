@@ -57,7 +57,7 @@ class _CFollowed(ctypes.Structure):
         ("columns", ctypes.c_void_p),
         ("column_count", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in ("gathered", "over", "held")),
-        ("passes", ctypes.c_int64),
+        ("passes", ctypes.c_void_p),
         *((name, ctypes.c_double) for name in ("begin", "end")),
     )
 
@@ -119,8 +119,9 @@ class FollowedInputs:
             ctypes.addressof(self._columns),
             len(columns),
             *(array.ctypes.data for array in self._arrays),
-            bool(interpolator.passes.any()),
+            interpolator.passes.ctypes.data,
         )
+        self._passes = interpolator.passes  # which initialisation may change
 
     @property
     def address(self) -> int:

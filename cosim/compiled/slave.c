@@ -91,13 +91,19 @@ static void note_step(Program *program, int64_t which, bool ordinary) {
     }
 }
 
+/* As `Slave.step_length` in Python. */
+static double step_length(const Slave *slave, double t, double until) {
+    const double length = until - t, whole = rint(length / slave->usual_step) * slave->usual_step;
+    return slave->rounding != 0.0 && fabs(length - whole) <= slave->rounding ? whole : length;
+}
+
 /* From `t` to `until` [s], in as many calls as the slave needs. True where nothing is to be seen to. */
 static bool do_step(Program *program, int64_t which, double t, double until) {
     Slave *slave = &program->slaves[which];
     about_to(program, slave, LAST_STEP);
     program->return_count = 0;
     for (;;) {
-        bool ordinary = called_step(program, slave, t, until - t);
+        bool ordinary = called_step(program, slave, t, step_length(slave, t, until));
         accepted(program, which, CALL_STEP);
         if (program->journal.on)
             note_step(program, which, ordinary);
@@ -272,7 +278,10 @@ static bool send_inputs(Program *program, int64_t which, double t, double until)
 /* It stands at `until` [s]: where only a mean was sent, outputs follow from the value there. */
 static bool arrive(Program *program, int64_t which, double until) {
     const Slave *slave = &program->slaves[which];
-    if (slave->followed == NULL || !slave->followed->passes)
+    bool passes = false;
+    for (int64_t i = 0; slave->followed != NULL && i < slave->input_count; i++)
+        passes |= slave->followed->passes[i] != 0;
+    if (!passes)
         return true;
     follow(slave, until, until, true);
     return send(program, which) || stopped(program, STOP_ARRIVE, which, 0);

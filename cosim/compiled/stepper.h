@@ -71,7 +71,7 @@ typedef struct {
     double *gathered;      /* all inputs, as they are at the end or the start of the step */
     const uint8_t *over;   /* of each input: it gets the mean over the step, not the value at the end */
     const uint8_t *held;   /* of each input: it is that of the start */
-    int64_t passes;        /* some of these means have direct feedthrough: the value at the end follows */
+    const uint8_t *passes; /* of each input: its mean has direct feedthrough, so that the value at the end follows */
     double begin, end;     /* of the step [s] */
 } Followed;
 
@@ -88,6 +88,7 @@ typedef struct {
     int64_t write_count, read_count;
     int64_t fmi_version;
     int64_t heeds_events;              /* FMI 3 with event mode: eventHandlingNeeded means something */
+    double usual_step, rounding;       /* whole multiples of it are handed over where a step is as long to rounding [s]; 0: never */
     int64_t input_count;               /* inputs with a source */
     const int64_t *sources;            /* where they lie in the values of the plan, or in those at the start behind them */
     const double *factors, *offsets;   /* NULL: nothing is converted */

@@ -24,10 +24,10 @@ class CSlave(ctypes.Structure):
 
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("instance", "do_step", "writes", "reads")),
-        *(
-            (name, ctypes.c_int64)
-            for name in ("write_count", "read_count", "fmi_version", "heeds_events", "input_count")
-        ),
+        *((name, ctypes.c_int64) for name in ("write_count", "read_count", "fmi_version", "heeds_events")),
+        ("usual_step", ctypes.c_double),
+        ("rounding", ctypes.c_double),
+        ("input_count", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in ("sources", "factors", "offsets", "inputs", "followed")),
         ("calls", ctypes.c_int64),
         ("all_calls", ctypes.c_int64),

@@ -7,6 +7,8 @@ import numpy as np
 from cosim.coupling.feedthrough import declared_feedthrough
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
+from cosim.diagnostics.messages import MessageLog
+from cosim.errors import RunError
 
 
 def exchange_in_initialization(plan: Plan) -> None:
@@ -25,15 +27,17 @@ def exchange_in_initialization(plan: Plan) -> None:
 class ExchangeAtInstant:
     """Exchanges after Initialization Mode, without a step between them; made where all outputs have just been read.
 
-    An FMU may refuse fmi2Get after fmi2Set until its next step (FMI 2.0.4, 4.2.4). So outputs are read again only where
-    an input that acts on them at once has another value than before; otherwise they are what they were.
+    An FMU may refuse fmi2Get after fmi2Set until its next step (FMI 2.0.5, 4.2.4). So outputs are read again only where
+    an input that acts on them at once has another value than before; otherwise they are what they were. One that
+    refuses there is initialised again, with these inputs.
 
     Args:
         plan: all components in step mode, their inputs sent and their outputs read.
+        start_time, stop_time: as they were initialised [s].
     """
 
-    def __init__(self, plan: Plan) -> None:
-        self._plan = plan
+    def __init__(self, plan: Plan, start_time: float, stop_time: float) -> None:
+        self._plan, self._start_time, self._stop_time = plan, start_time, stop_time
         self._acted_on = [_acted_on_at_once(plan, step) for step in plan.steps]
         self._read = [step.outputs.copy() for step in plan.steps]
 
@@ -43,12 +47,49 @@ class ExchangeAtInstant:
             sent = step.inputs.buffer.copy()
             step.write()
             if acted_on and not _is_equal(step, sent):
-                step.read()
+                self.read_after_set(step)
                 known[:] = step.outputs
             else:
                 step.outputs[:] = known  # a search for what is fed back may have tried other values
         for relay in self._plan.relays:
             relay()
+
+    def read_after_set(self, step: PlannedComponent) -> bool:
+        """Read the outputs of a component whose inputs were set, initialised again where it refuses that.
+
+        Args:
+            step: of the plan.
+
+        Returns:
+            Whether it took it.
+
+        Raises:
+            RunError: it cannot be read anyway.
+        """
+        component = step.component
+        own, component.messages = component.messages, MessageLog(component.name)  # a refusal is no fault
+        try:
+            step.read()
+            return True
+        except RunError as error:
+            component.messages = own
+            try:
+                self._initialise_again(step)
+            except RunError:
+                raise error from None
+            return False
+        finally:
+            component.messages = own
+
+    def _initialise_again(self, step: PlannedComponent) -> None:
+        component = step.component
+        component.reset()
+        for name, value in list(component.starts.items()):
+            component.set_start(name, value)
+        component.enter_initialization(self._start_time, self._stop_time)
+        step.inputs.send()
+        component.exit_initialization()
+        step.read()
 
 
 def _is_equal(step: PlannedComponent, sent: np.ndarray) -> bool:

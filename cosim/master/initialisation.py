@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 from cosim.coupling.plan import Plan
+from cosim.coupling.planned import PlannedComponent
 from cosim.errors import RunError
 from cosim.master.algorithms.acceleration import Newton
 from cosim.master.algorithms.history import shown
@@ -30,11 +31,16 @@ _EXPLOSION = 100.0
 TOLERANCE = 1e-12
 """A value that moves by less than this share of itself has settled: a few roundings of a double."""
 
+_REFUSED = (
+    "not said by the FMU: it refuses to be read between a set and its next step (FMI 2.0.5, 4.2.4), so outputs that "
+    "follow an input at once show the mean of the input over the step"
+)
+
 _JUMP = 1e-6
 """What changes by more than this share of itself when initialisation ends has jumped."""
 
 
-def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
+def initialise(plan: Plan, start_time: float, stop_time: float, initialised: Callable[[], None] = lambda: None) -> int:
     """Bring all components from instantiated to step mode.
 
     What jumps when initialisation ends (a sample taken at the start time) is passed on once more, so that the first row
@@ -44,6 +50,7 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     Args:
         plan: prepared, components instantiated and start values set.
         start_time, stop_time: [s].
+        initialised: called when Initialization Mode is over, before an input is set again.
 
     Returns:
         Number of exchange rounds it took.
@@ -58,14 +65,28 @@ def initialise(plan: Plan, start_time: float, stop_time: float) -> int:
     if changing:
         raise _changes_when_read(plan, start_time) or _unsettled(plan, changing, settling.residuals, start_time)
     _leave_initialization(plan)
+    initialised()
     rounds = settling.rounds
-    settling.exchange = ExchangeAtInstant(plan)
+    settling.exchange = exchange = ExchangeAtInstant(plan, start_time, stop_time)
     if settling.exchange_changes_feedback():
         settling.run()
     plan.begin_step()
-    for interpolator in plan.interpolators:
-        interpolator.prepare(start_time)  # where its lines begin
+    for step in plan.steps:
+        if step.interpolator is not None:
+            step.interpolator.prepare(start_time)  # where its lines begin
+            _demand_arrivals(exchange, step)
     return rounds
+
+
+def _demand_arrivals(exchange: ExchangeAtInstant, step: PlannedComponent) -> None:
+    """Whether a component may be set and read where its steps end; of one that refuses that outputs show the mean."""
+    passes = getattr(step.interpolator, "passes", None)
+    if passes is None or not passes.any():
+        return
+    step.inputs.send()
+    if not exchange.read_after_set(step):
+        step.component.note(_REFUSED, "warning")
+        passes[:] = False
 
 
 def _leave_initialization(plan: Plan) -> None:

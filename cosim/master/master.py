@@ -131,8 +131,8 @@ class Master:
         events: of the components: ``propagate`` them to others at the same instant, or leave them ``local``.
         network: over which measurements travel, or None.
 
-    `initialised` is called once before the first step, `between_steps` between two steps, or chunks of the compiled
-    stepper; they may raise KeyboardInterrupt.
+    `initialised` is called once when Initialization Mode is over, before an input is set again, `between_steps`
+    between two steps, or chunks of the compiled stepper; they may raise KeyboardInterrupt.
 
     After `run`, `recorder`, `timing`, `exchange_rounds` and `balises.mailbox.log` hold what came out, also when it
     failed.
@@ -167,7 +167,7 @@ class Master:
         self._stepper: StepperChoice | None = None
         self._choose_stepper = stepper
         self.between_steps: Callable[[], None] | None = None
-        self.initialised: Callable[[], None] | None = None
+        self.initialised: Callable[[], None] = lambda: None
 
     def choose_stepper(self) -> StepperChoice:
         """Choose who executes the plan, where nobody did before; `run` does so too.
@@ -181,6 +181,8 @@ class Master:
             CouplingError: the compiled stepper is demanded and cannot be had; why.
         """
         if self._stepper is None:
+            for planned in self.plan.steps:
+                planned.component.expect_steps(self.axis.step / planned.substeps, self.axis.start, self.axis.stop)
             self._stepper = self._choose_stepper(self.control, self.axis)
         return self._stepper
 
@@ -199,12 +201,10 @@ class Master:
         compiled = self.stepper.compiled
         begin = perf_counter()
         try:
-            self.exchange_rounds = initialise(self.plan, self.axis.start, self.axis.stop)
+            self.exchange_rounds = initialise(self.plan, self.axis.start, self.axis.stop, self.initialised)
             self.system.start(self.axis.start)
             self.recorder.add(self.axis.start, self.plan.values)
             self._check_finite(self.axis.start)
-            if self.initialised is not None:
-                self.initialised()
         finally:
             self.timing.initialisation = perf_counter() - begin
         begin = perf_counter()

@@ -214,6 +214,7 @@ class Runner(AbstractContextManager["Runner"]):
         self._started = True
         component = self.component
         component.instantiate()
+        component.expect_steps(self.h, self.t0, self.end)
         names = self.output_names
         self._outputs = np.zeros(len(names))
         self._read = component.reader(names, self._outputs)

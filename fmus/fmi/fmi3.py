@@ -106,7 +106,7 @@ class FMI3Slave(FMI3Instance, Slave):
         note.call[0], note.time[0] = self._step_number, t
         begin = perf_counter()
         try:
-            event, terminate, early, reached = self._do_step(t, until - t)
+            event, terminate, early, reached = self._do_step(t, self.step_length(t, until))
             if self._intermediate.requested:
                 self._intermediate.check()
         except self.mistakes:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Protocol
 
+import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription
 
@@ -18,6 +19,9 @@ from fmus.fmi.instance import Instance
 from fmus.fmi.native_calls import prepared_call
 from fmus.fmi.ports import is_native
 from fmus.fmi.standard import DISCARD, NEVER, OK, PENDING, STATUS, WARNING
+
+_ROUNDINGS = 4.0 * float(np.finfo(float).eps)
+"""By how much the difference of two communication points may miss the length of a step, as a share of their size."""
 
 
 class _CallNote(Protocol):
@@ -82,6 +86,28 @@ class Slave(Instance):
         self.time, self.next_event = math.nan, NEVER
         self._call_note: _CallNote = _Unnoted()
         self._step_number = 0
+        self.usual_step, self.rounding = 1.0, 0.0
+
+    def expect_steps(self, step: float, start: float, stop: float) -> None:
+        """State the length of the ordinary step, of which an FMU may want whole multiples and nothing else.
+
+        Args:
+            step: [s]. start, stop: of the run [s].
+        """
+        if is_native(self.slave):
+            self.usual_step, self.rounding = step, _ROUNDINGS * (abs(start) + abs(stop))
+
+    def step_length(self, t: float, until: float) -> float:
+        """The length that doStep is handed for a step from `t` to `until` [s].
+
+        The difference of two communication points is a multiple of the ordinary step but for rounding: where it is
+        that, this multiple.
+        """
+        length = until - t
+        if not self.rounding:
+            return length
+        whole = round(length / self.usual_step) * self.usual_step
+        return whole if abs(length - whole) <= self.rounding else length
 
     def reset(self) -> None:
         """Back to the state after `instantiate`."""
@@ -184,7 +210,7 @@ class WholeStepSlave(Slave):
         note.call[0], note.time[0] = self._step_number, t
         begin = perf_counter()
         try:
-            self._do_step(t, until - t, *self._last)
+            self._do_step(t, self.step_length(t, until), *self._last)
             self.time = until
         except FMICallException as error:
             if error.status == PENDING:

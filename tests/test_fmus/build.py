@@ -56,6 +56,7 @@ def linear_fmu(
     inner_linear: bool = False,
     early: bool = False,
     frozen_outputs: bool = False,
+    strict: bool = False,
     declare_dependencies: bool = True,
     once_per_process: bool = False,
     needs_tool: bool = False,
@@ -81,6 +82,7 @@ def linear_fmu(
             linear in between.
         early: FMI 3.0: it may return early at an inner instant where the importer asks for it.
         frozen_outputs: outputs do not follow inputs that are set between steps, as the standard permits.
+        strict: between steps it refuses to be read after an input was set (FMI 2.0.5, 4.2.4), and is lost then.
         declare_dependencies: False: nothing is said of direct dependencies.
         once_per_process, needs_tool: declared only.
     """
@@ -128,6 +130,7 @@ def linear_fmu(
         "HAS_OUTPUT_DERIVATIVES": output_derivatives,
         "HAS_DIRECTIONAL": directional and version > 1,
         "FROZEN_OUTPUTS": frozen_outputs,
+        "REFUSES_GET_AFTER_SET": strict,
         "CAN_SAVE": state,
         "A": a.ravel().tolist(),
         "B": b.ravel().tolist(),
@@ -209,6 +212,7 @@ DEFAULTS: dict[str, Define] = {
     "HAS_DIRECTIONAL": False,
     "FROZEN_OUTPUTS": False,
     "HIDES_LAST_TIME": False,
+    "REFUSES_GET_AFTER_SET": False,
     "MIGHT_RETURN_EARLY": True,
     "TAKES_TOLERANCE": False,
 }

@@ -325,6 +325,7 @@ Behaviour = Literal[
     "fails",
     "dies",
     "waits",
+    "exact-steps",
 ]
 _CODES = {
     "quit": 1,
@@ -338,6 +339,7 @@ _CODES = {
     "dies": 8,
     "waits": 9,
     "own-steps": 10,
+    "exact-steps": 11,
 }
 
 
@@ -362,7 +364,8 @@ def awkward_fmu(
             ``own-steps`` moves in steps of its own of that length, stays at the last one within a step, which is FMI
             3.0's lastSuccessfulTime, and does not return early; ``chatty`` logs at `at`, `at` + `every`, ..., see
             `chatter`; ``warns``: every step returns a warning; ``fails``, ``dies``: error or fatal in the step over
-            `at`; ``waits``: pending there (FMI 1.0, 2.0).
+            `at`; ``waits``: pending there (FMI 1.0, 2.0); ``exact-steps`` refuses a step that is no whole multiple of
+            ``u``, to the last bit.
         early: it may return early.
     """
     event_mode = behaviour == "quit-in-event" and version == 3

@@ -266,7 +266,7 @@ def test_what_its_inputs_act_on_is_not_read_again_where_they_stayed_as_they_were
 def test_a_value_that_was_tried_for_what_is_fed_back_does_not_stay_where_nothing_is_read() -> None:
     plan = prepare([component(Strict(), "a"), component(Strict(), "b")], [("a.y", "b.u"), ("b.y", "a.u")], 0.1, 1).plan
     initialise(plan, 0.0, 0.1)
-    exchange = ExchangeAtInstant(plan)
+    exchange = ExchangeAtInstant(plan, 0.0, 0.1)
     plan.values[:] = 99.0
     exchange()
     assert plan.values.tolist() == [1.0, 1.0]

@@ -12,6 +12,7 @@
 #define FAILS 7       /* error in the step over AT */
 #define DIES 8        /* fatal error in the step over AT */
 #define WAITS 9       /* pending (FMI 1 and 2) */
+#define EXACT_STEPS 11 /* refuses a step that is no whole multiple of u, to the last bit */
 #define OWN_STEPS 10  /* moves in whole steps of LONGEST_STEP, and waits at the last one of them before the end of a step */
 
 typedef struct {
@@ -77,6 +78,11 @@ static Outcome model_step(Model *m, Host *host, double t, double until) {
     m->time = until;
     outcome.lag = until - m->moved_to;
     return outcome;
+#elif BEHAVIOUR == EXACT_STEPS
+    if (host->length != round(host->length / m->u) * m->u) {
+        SAY(host, ERROR, "logStatusError", "a step of %.17g s is no multiple of %.17g s", host->length, m->u);
+        return (Outcome){.status = ERROR, .reached = t};
+    }
 #elif BEHAVIOUR == CHATTY
     talk(m, host, until);
 #elif BEHAVIOUR == WARNS

@@ -21,6 +21,7 @@ typedef struct {
     Status last_status;
     bool ended;   /* FMI 2: the last doStep asked for the end */
     Mode mode;
+    bool set; /* an input was set since the last step */
 } Saved; /* all that a state holds */
 
 typedef struct {
@@ -81,6 +82,15 @@ static bool set_categories(Host *host, bool on, size_t count, const char *const 
     return true;
 }
 
+/* Whether variables may be read now (FMI 2.0.5, 4.2.4); an instance that was read when they may not be is lost. */
+static bool gettable(Instance *instance) {
+    if (!REFUSES_GET_AFTER_SET || instance->now.mode != STEP_MODE || !instance->now.set)
+        return true;
+    SAY(&instance->host, ERROR, "logStatusError", "a get after a set without a step between them");
+    instance->now.mode = STOPPED;
+    return false;
+}
+
 /* -- values -------------------------------------------------------------------------------------------------------- */
 
 static Slot find(Instance *instance, unsigned reference, Kind kind) {
@@ -105,8 +115,10 @@ static bool settable(Instance *instance, const Slot *slot, unsigned reference) {
     else if (slot->role != PARAMETER)
         modes = 0;
     const bool ticking = slot->role != CLOCKED_INPUT || slot->clock == NULL || *slot->clock;
-    if ((mode & modes) && ticking)
+    if ((mode & modes) && ticking) {
+        instance->now.set = mode == STEP_MODE;
         return true;
+    }
     SAY(&instance->host, ERROR, "logStatusError", "value reference %u cannot be set in mode %d%s", reference, (int)mode,
         ticking ? "" : ": its clock is not active");
     return false;
@@ -124,6 +136,8 @@ static void refresh(Instance *instance) {
 #define GETTER(NAME, KIND, TYPE, OWN)                                                                        \
     static bool NAME(Instance *instance, const unsigned *references, size_t n, TYPE *values, size_t count) { \
         size_t k = 0;                                                                                        \
+        if (!gettable(instance))                                                                             \
+            return false;                                                                                    \
         refresh(instance);                                                                                   \
         for (size_t i = 0; i < n; i++) {                                                                     \
             const Slot slot = find(instance, references[i], KIND);                                           \
@@ -207,6 +221,8 @@ static Outcome advance(Instance *instance, double t, double h) {
     Saved *now = &instance->now;
     if (!here(instance, t, h))
         return (Outcome){.status = ERROR, .reached = now->time};
+    instance->host.length = h;
+    now->set = false;
     Outcome outcome = model_step(&now->model, &instance->host, t, t + h);
     if (outcome.status <= DISCARD)
         now->time = outcome.reached;

@@ -33,6 +33,7 @@ typedef struct {
     Logger log;
     bool logging, category_on[CATEGORIES];
     bool event_mode, early_allowed;
+    double length; /* of the step under way [s], as it was handed over */
     Scratch scratch;
 #if FMI_VERSION == 3
     fmi3IntermediateUpdateCallback intermediate;
