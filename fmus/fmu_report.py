@@ -5,14 +5,15 @@ never runs.
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable
 from fmpy.validation import validate_fmu
 
-from fmus.fmi.binaries import LIBRARY_SUFFIXES, why_not_here
+from fmus.fmi.archive import Archive
+from fmus.fmi.binaries import LIBRARY_SUFFIXES
 from fmus.fmi.capabilities import HELD_AS
 from fmus.fmi.description import read_description
 from fmus.fmi.standard import INTERFACES, fmi_version
@@ -73,7 +74,7 @@ def describe_file(path: Path) -> dict[str, Any]:
         "interfaces": [text for name, text in INTERFACES.items() if getattr(description, name) is not None],
         "tool": description.generationTool or "",
         "platforms": platforms,
-        f"this machine ({host_platform().name})": _on_this_machine(description, names),
+        f"this machine ({host_platform().name})": _on_this_machine(Archive(path, description, tuple(names))),
         **_capabilities(description),
         "variables": [_variable(v) for v in description.modelVariables],
     }
@@ -118,12 +119,11 @@ def _libraries(archive: zipfile.ZipFile) -> list[str]:
     ]
 
 
-def _on_this_machine(description: ModelDescription, names: Sequence[str]) -> str:
-    interfaces = (getattr(description, key) for key in INTERFACES)
-    reason = why_not_here(description, {i.modelIdentifier for i in interfaces if i is not None}, names)
-    has_sources = any(name.startswith("sources/") and name.endswith(".c") for name in names)
-    rebuild = " Its sources can be compiled." if reason and has_sources else ""
-    return f"no, it {reason}{rebuild}" if reason else "yes"
+def _on_this_machine(archive: Archive) -> str:
+    reason = archive.why_not_here()
+    if reason:
+        return f"no, it {reason}"
+    return "yes" if archive.here else "yes, by a library that was compiled of its sources here"
 
 
 def _damage(archive: zipfile.ZipFile) -> list[str]:

@@ -67,6 +67,19 @@ def pack_fmu(files: Mapping[str, bytes], target: Path) -> Path:
     return target
 
 
+def files_of(path: Path) -> dict[str, bytes]:
+    """The files of an FMU: content by name.
+
+    Args:
+        path: of the FMU.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with zipfile.ZipFile(path) as archive:
+        return {entry.filename: archive.read(entry) for entry in archive.infolist() if not entry.is_dir()}
+
+
 def _entry(name: str) -> zipfile.ZipInfo:
     entry = zipfile.ZipInfo(name, _TIMESTAMP)
     entry.create_system = 3  # the same on every system

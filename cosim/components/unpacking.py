@@ -113,6 +113,7 @@ def _extract(archive: Archive, folder: Path) -> None:
     left_out = () if fmi_version(archive.description) == 1 else _FOR_READERS
     with zipfile.ZipFile(archive.path) as file:
         file.extractall(folder, [name for name in archive.names if not name.startswith(left_out)])
+    archive.add_compiled(folder)
 
 
 def _digest(path: Path) -> str | None:

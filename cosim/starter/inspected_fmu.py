@@ -35,7 +35,7 @@ class InspectedFmu:
         inputs, outputs, parameters, hidden: numeric scalars, and the elements of short arrays; hidden ones are local
             variables, which may be read like outputs.
         unread: inputs and outputs that no connection of numbers can reach (texts, clocks, long arrays), a line each.
-        runs_here: whether it has a library for this platform.
+        runs_here: ``yes``, or why it cannot run on this machine.
     """
 
     path: Path
@@ -45,7 +45,7 @@ class InspectedFmu:
     parameters: Sequence[GuessedSignal]
     hidden: Sequence[GuessedSignal]
     unread: Sequence[str]
-    runs_here: bool
+    runs_here: str
 
     @property
     def description(self) -> ModelDescription:
@@ -74,9 +74,8 @@ def inspect_fmu(path: Path, units: Mapping[str, StatedUnit] = NONE_STATED) -> In
         found[variable.causality] += signals
         if not signals and variable.causality in ("input", "output"):
             unread.append(_unread(variable))
-    here = runs_here(path) == "yes"
     return InspectedFmu(
-        path, component, found["input"], found["output"], found["parameter"], found["local"], unread, here
+        path, component, found["input"], found["output"], found["parameter"], found["local"], unread, runs_here(path)
     )
 
 

@@ -244,8 +244,9 @@ def _about(inspected: InspectedFmu) -> str:
 
 
 def _remarks(inspected: InspectedFmu, kind: str, roles: PlantRoles, observer: str | None) -> Iterator[str]:
-    if not inspected.runs_here:
-        yield f"{inspected.path.name} has no library for this platform: the scenario will not run here."
+    if inspected.runs_here != "yes":
+        reason = inspected.runs_here.removeprefix("no, it ").removesuffix(".")
+        yield f"The scenario will not run here yet: {inspected.path.name} {reason}."
     if kind == "alone":
         yield "Nothing in the FMU looks like the position or speed of a train: the scenario runs it alone."
     if kind != "train" and observer is not None:

@@ -12,11 +12,12 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
 from fmpy import read_model_description
-from fmpy.model_description import ModelDescription, ValidationError
+from fmpy.model_description import BuildConfiguration, ModelDescription, ValidationError
 
 from fmus.fmi.binaries import platform_folder, platforms_with, why_not_here
 from fmus.fmi.description import FILE, read_description
 from fmus.fmi.sense import distinguish, nonsense
+from fmus.fmi.sources import add_compiled, build_configurations, compiled_here, how_to_compile
 from fmus.fmi.standard import INTERFACES
 from fmus.near_files import missing_file, what_it_is
 
@@ -65,7 +66,39 @@ class Archive:
         Args:
             interfaces: types of which the library must offer one, by default all that are declared.
         """
-        return why_not_here(self.description, self._identifiers(*(interfaces or self.interfaces)), self.names)
+        wanted = self._identifiers(*(interfaces or self.interfaces))
+        reason = why_not_here(self.description, wanted, self.names)
+        if not reason or self.compiled_here(*interfaces):
+            return ""
+        return reason + how_to_compile(self.path, self.build_configurations(*interfaces))
+
+    def compiled_here(self, *interfaces: str) -> list[Path]:
+        """Libraries compiled of its sources on this machine; arguments as for `why_not_here`.
+
+        Args:
+            interfaces: in the words of fmpy.
+        """
+        return compiled_here(self.path, self._identifiers(*(interfaces or self.interfaces)))
+
+    def build_configurations(self, *interfaces: str) -> list[BuildConfiguration]:
+        """What its libraries are compiled of; arguments as for `why_not_here`.
+
+        Args:
+            interfaces: in the words of fmpy.
+        """
+        wanted = self._identifiers(*(interfaces or self.interfaces))
+        return build_configurations(self.description, wanted, self.names)
+
+    def add_compiled(self, folder: Path) -> None:
+        """Put the libraries compiled of its sources on this machine where it lacks them.
+
+        Args:
+            folder: where it is unpacked.
+
+        Raises:
+            OSError: a file cannot be written.
+        """
+        add_compiled(self.path, self._identifiers(*self.interfaces), self.description, folder)
 
     def demand_this_platform(self, *interfaces: str) -> None:
         """Refuse an FMU without a library for this platform; arguments as for `why_not_here`.
@@ -96,6 +129,7 @@ class Archive:
                     archive.extractall(name)
             except Exception as error:  # each compression throws its own: zlib.error, lzma.LZMAError
                 raise NotAnFmuError(f"{self.path} is a corrupt archive: {error or type(error).__name__}") from error
+            self.add_compiled(Path(name))
             yield Path(name)
 
 

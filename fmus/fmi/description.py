@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -79,8 +80,19 @@ def _read(source: Path) -> ModelDescription:
     """
     if source.is_dir() or source.suffix.lower() == ".xml":
         return read_model_description(str(source), validate=False)
-    with source.open("rb") as file:
-        return read_model_description(file, validate=False)
+    try:
+        with source.open("rb") as file:
+            return read_model_description(file, validate=False)
+    except Exception:  # perhaps of buildDescription.xml, which nobody needs who has a library
+        return read_model_description(_alone(source), validate=False)
+
+
+def _alone(source: Path) -> BytesIO:
+    """An archive with nothing but the model description of an FMU file."""
+    alone = BytesIO()
+    with zipfile.ZipFile(source) as archive, zipfile.ZipFile(alone, "w") as copy:
+        copy.writestr(FILE, archive.read(FILE))
+    return alone
 
 
 def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:

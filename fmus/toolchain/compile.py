@@ -125,7 +125,20 @@ def compile_library(compiler: Compiler, folder: Path, sources: Sequence[str], li
     Raises:
         CompilationError: the compiler refused.
     """
-    command = [*compiler.command, *FLAGS, *compiler.flags, f"-I{header_folder()}", *sources, "-o", library, "-lm"]
+    run_compiler(compiler, folder, [*FLAGS, *compiler.flags, f"-I{header_folder()}", *sources, "-o", library, "-lm"])
+    return folder / library
+
+
+def run_compiler(compiler: Compiler, folder: Path, words: Sequence[str]) -> None:
+    """Run a compiler once.
+
+    Args:
+        compiler: see `find_compiler` and `cross_compiler`. folder: in which it works. words: the rest of its command.
+
+    Raises:
+        CompilationError: it refused.
+    """
+    command = [*compiler.command, *words]
     with tempfile.TemporaryDirectory(prefix="fmus-scratch-") as scratch:
         environment = _zig_environment(Path(scratch)) if compiler.zig else None
         done = subprocess.run(
@@ -135,7 +148,6 @@ def compile_library(compiler: Compiler, folder: Path, sources: Sequence[str], li
         raise CompilationError(
             f"{shlex.join(command)} failed with code {done.returncode}:\n{done.stderr.strip() or done.stdout.strip()}"
         )
-    return folder / library
 
 
 def header_folder() -> Path:

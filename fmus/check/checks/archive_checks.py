@@ -10,6 +10,7 @@ from fmus.check.findings import CheckOutcome, noted, passed
 from fmus.fmi.archive import Archive
 
 SHOWN = 3
+_COMPILED = "a library that was compiled of its sources on this machine"
 
 
 def validation(archive: Archive) -> CheckOutcome:
@@ -40,4 +41,5 @@ def platforms(archive: Archive) -> CheckOutcome:
     """
     others = [p for p in archive.platforms if p not in archive.here]
     foreign = f"; not checked here: {', '.join(others)}" if others else ""
-    return passed(f"a library for this platform ({', '.join(archive.here)}){foreign}")
+    library = f"a library for this platform ({', '.join(archive.here)})" if archive.here else _COMPILED
+    return passed(library + foreign)
