@@ -19,6 +19,7 @@ from cosim.choice.observer_runs import ObserverRun, ObserverRuns
 from cosim.choice.observer_scores import ObserverScore, divergence, gap_certified, longest_gap, measured
 from cosim.choice.playback import ScenarioParts, find_parts, recording_scenario
 from cosim.errors import CosimError, RunError, ScenarioError
+from cosim.evaluation.plausible_speeds import speed_warnings
 from cosim.evaluation.result_warnings import largest_tolerable
 from cosim.evaluation.roles import recorded as recorded_signal
 from cosim.evaluation.spec import ReportSpec
@@ -141,14 +142,17 @@ def _journey(scenario: Scenario, parts: ScenarioParts, result: Result) -> Journe
     """Where the train was.
 
     Raises:
-        ScenarioError: nothing says which signals are its position and speed.
+        ScenarioError: nothing says which signals are its position and speed, or they are not those of one motion.
     """
-    position, speed = (recorded_signal(result, name) for name in true_signals(parts))
+    names = true_signals(parts)
+    position, speed = (recorded_signal(result, name) for name in names)
     if position is None or speed is None:
         raise ScenarioError(
             f"{scenario.where}: nothing says where the train truly is. Name the signals under [balises] (position, "
             "speed) or [report] (true_position, true_speed)."
         )
+    for text in speed_warnings(result, ReportSpec(true_position=names[0], true_speed=names[1])):
+        raise ScenarioError(f"{scenario.where}: {text}")
     return Journey(result.time, position, speed)
 
 

@@ -204,6 +204,21 @@ def test_a_train_of_which_nobody_says_where_it_is_is_refused() -> None:
         choose(Scenario(**data), ["luenberger"], seeds=0)
 
 
+@pytest.mark.parametrize("factor", [1.0, 3.6])
+def test_speed_and_position_of_two_motions_are_refused_before_anything_is_played(factor: float, tmp_path: Path) -> None:
+    """A log whose speed is in km/h and does not say so; the same in m/s is a train."""
+    rows = [f"{t},{10.0 * t},{10.0 * factor}" for t in range(31)]
+    (tmp_path / "log.csv").write_text("\n".join(["time,position,speed", *rows]), encoding="utf-8")
+    made = Scenario(folder=tmp_path, stop=30.0, step=0.1).add("log", recording="log.csv")
+    made.report(true_position="log.position", true_speed="log.speed", odometer="log.speed")
+    made.balises(position="log.position", speed="log.speed", layout="spacing", spacing=50.0, track_end=1e3)
+    if factor == 1.0:
+        assert choose(made, ["odometer_reset"], seeds=0).best.safe
+    else:
+        with pytest.raises(ScenarioError, match=r"do not go together: the train moves 300 m.*km/h taken for m/s"):
+            choose(made, ["odometer_reset"], seeds=0)
+
+
 def test_a_plant_fmu_alone_gets_the_scenario_of_its_starter(tmp_path: Path) -> None:
     fmu: Any = cached_fmu(PLANTS["locomotive"](), fmi_version=3)
     scenario = scenario_for_fmu(fmu).set("stop", 3.0)
