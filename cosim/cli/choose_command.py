@@ -16,12 +16,12 @@ from cosim.cli.scenarios import load_scenario
 from cosim.errors import OutputError, RunError, ScenarioError
 from cosim.results.results_folder import check_writable
 from cosim.simulation.scenario import Scenario
-from fmus.cli.colour import Role
 from fmus.cli.commands import argument, one_of
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from plant_models.hybrid.casadi_package import demand_casadi
 
+_DONE, _NOTHING_SAFE = 0, 1
 _SCENARIOS = (".toml", ".ssp")
 
 
@@ -43,7 +43,10 @@ PARSER = {
         "side: as it is, and disturbed with errors of both signs (mass, resistance, slopes, noise, wear, losses, jams "
         "and skids). First comes what stays within the allowance in all runs, then the smallest position error."
     ),
-    "epilog": "Exit codes: 0 there is an answer, 2 error or interrupted: what was evaluated is printed alone.",
+    "epilog": (
+        "Exit codes: 0 an observer is safe, 1 none is (--allowance grants more), 2 error or interrupted: what was "
+        "evaluated is printed alone."
+    ),
 }
 ARGUMENTS = (
     argument("scenario", metavar="SCENARIO|FMU", help="a shipped scenario, a file (.toml or .ssp), or a plant (.fmu)"),
@@ -101,8 +104,16 @@ def execute(options: argparse.Namespace) -> Output:
     if options.out is not None:
         files |= choice.write(options.out, figures=options.figures)
     verdict = choice.answer if choice.found else ""
-    role: Role = "good" if choice.found and choice.best.safe else "bad"
-    return Output(choice.parts(), choice.to_data(), files, error=_error(choice), verdict=verdict, role=role)
+    safe = choice.found and choice.best.safe
+    return Output(
+        choice.parts(),
+        choice.to_data(),
+        files,
+        code=_DONE if safe else _NOTHING_SAFE,
+        error=_error(choice),
+        verdict=verdict,
+        role="good" if safe else "bad",
+    )
 
 
 def _error(choice: Choice) -> BaseException | None:

@@ -52,6 +52,17 @@ def test_a_file_that_exists_is_kept(scenario: str, capsys: pytest.CaptureFixture
     assert Path(scenario).read_bytes() != before
 
 
+def test_where_nothing_is_safe_the_verdict_comes_last_with_exit_code_1_and_an_allowance_relaxes_it(
+    scenario: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = ["--observers", "odometer_reset", "--seeds", "1", "--further", "0", "--quiet"]
+    assert main(["choose", scenario, *few, "--allowance", "0.0001+0%"]) == 1
+    text = capsys.readouterr().out
+    assert text.splitlines()[-1].startswith("nothing is safe here, least bad odometer_reset, because of ")
+    assert main(["choose", scenario, *few, "--allowance", "100+0%"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1].startswith("use odometer_reset")
+
+
 def test_the_former_name_says_what_is_typed_now(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["benchmark-observers", scenario])
