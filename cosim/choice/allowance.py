@@ -14,6 +14,7 @@ from cosim.evaluation.metrics import evaluated_size
 from cosim.evaluation.roles import estimation_error, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
+from fmus.tables.numbers import number
 
 _TEXT = re.compile(r"\s*([^\s%]+?)\s*(?:m\s*)?\+\s*([^\s%+]+)\s*%\s*")
 
@@ -79,6 +80,12 @@ class UsedAllowance:
     time: float
     rms: float
     allowed: float
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        share, rms = number(100.0 * self.share), number(self.rms)
+        return f"at most {share} % of the allowance, at {self.time:.1f} s, position error {rms} m rms"
 
 
 def used_allowance(result: Result, spec: ReportSpec, name: str, allowance: Allowance) -> UsedAllowance | None:

@@ -44,6 +44,14 @@ class BenchmarkCandidate(Listener):
         """Shipped observer or FMU."""
         return str(self.table.observer or self.table.model or self.table.fmu)
 
+    @property
+    def asked(self) -> Any:
+        """What names it for another run."""
+        model = self.table.observer
+        if self.origin == "scenario" or model is None:
+            return self.name
+        return model if model.stated is not None else str(self.table.label)
+
 
 def find_candidates(
     scenario: Scenario, parts: ScenarioParts, names: Observers, known: Known | None = None

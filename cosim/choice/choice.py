@@ -39,7 +39,7 @@ _SHOWN = 8
 _CUT = 12
 """How many rows of a group a terminal shows; all stand on the page and in the data."""
 _SHARE = Column("share", "of allowance", "%", "Largest share of the allowance in all runs that count", factor=100.0)
-_HARDER = Column("harder", "harder", "%", "The same in runs twice as hard, which do not count", factor=100.0)
+_WORST = text_column("worst", "worst run")
 _RUNS = Column("runs", "runs", "", "How many runs count for it")
 _RMS = error_column("rms_position_error", "rms p", "m", "Position error over all runs that count")
 _SPEED = error_column("rms_speed_error", "rms v", "m/s", "Speed error of the nominal run")
@@ -123,11 +123,19 @@ class Choice(Readable):
     def tables(self) -> list[Table]:
         """A table for each group."""
         use, works, bad, left = self.groups.items()
-        tables = [Table(key.replace(" ", "_"), _GOOD, [_good(r) for r in rows], key) for key, rows in (use, works)]
+        columns = [_NAME, _RUNS, _SHARE, _WORST, self._harder, _RMS, _SPEED, _COST]
+        tables = [Table(key.replace(" ", "_"), columns, [_good(r) for r in rows], key) for key, rows in (use, works)]
         rows = [[r.named, r.share if isfinite(r.share) else None, r.why_not(self._acting(r))] for r in bad[1]]
         tables.append(Table("not_for", [_NAME, _SHARE, _BECAUSE], rows, f"{bad[0]}, because"))
         misfits = [[row.named, row.why_not()] for row in left[1]]
         return [*tables, Table("not_tried", [_NAME, _BECAUSE], misfits, left[0])]
+
+    @property
+    def _harder(self) -> Column:
+        """The column of the harder runs; its heading says how many there are, which are fewer than those that count."""
+        count = sum(disturbance.harder for disturbance in self.disturbances)
+        meaning = f"Largest share in the first {count} disturbed runs with all twice as large; they do not count"
+        return Column("harder", f"harder ({count} runs)", "%", meaning, factor=100.0)
 
     def lines(self) -> str:
         """The best observer as lines of a scenario."""
@@ -242,9 +250,6 @@ def _cut(table: Table) -> Table:
     return replace(table, rows=table.rows[:_CUT], notes=[*table.notes, f"likewise, or worse: {left}"])
 
 
-_GOOD = (_NAME, _RUNS, _SHARE, _HARDER, _RMS, _SPEED, _COST)
-
-
 def _good(row: Row) -> list[Any]:
     harder = max((used.share for used in row.harder.values()), default=None)
     cost = row.score.cost
@@ -252,6 +257,7 @@ def _good(row: Row) -> list[Any]:
         row.named,
         len(row.used),
         row.share,
+        f"{row.worst[0]} at {row.worst[1].time:.0f} s",
         harder,
         row.rms,
         row.score.speed_rms,

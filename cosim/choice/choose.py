@@ -10,20 +10,18 @@ from typing import Any
 
 from cosim.choice.allowance import Allowance
 from cosim.choice.benchmark import ObserverBenchmark
-from cosim.choice.candidates import BenchmarkCandidate
 from cosim.choice.choice import INTERRUPTED, Choice
 from cosim.choice.ranking import Row, contenders, ranked
 from cosim.choice.rows import merged, row_of
-from cosim.choice.trial import Trial, require_any, tried
+from cosim.choice.trial import HARDER, Trial, require_any, tried
 from cosim.errors import ScenarioError
 from cosim.run.backends import Notify
 from cosim.runs.executors import Executor, make_executor
 from cosim.simulation.scenario import Scenario
 from cosim.starter.starter_file import starter
 
-SEEDS, FURTHER, _HARDER = 4, 24, 2.0
-"""Disturbed runs of all, so that each error has both signs; those that the best get besides; and how much larger all is
-in those that do not count."""
+SEEDS, FURTHER = 4, 24
+"""Disturbed runs of all, so that each error has both signs, and those that the best get besides."""
 Progress = Callable[[str, int, int], None]
 
 
@@ -109,7 +107,7 @@ class _Search:
         """All rows on the seeds, what is safe also on harder ones, the best on further ones; in order."""
         self._round("disturbed", self._rows(), range(1, seeds + 1))
         rows = merged(self._rows())
-        self._round("harder", [row for row in rows if row.safe], range(1, seeds + 1), _HARDER)
+        self._round("harder", [row for row in rows if row.safe], range(1, seeds + 1), HARDER)
         kept = {row.score.name: row.also for row in rows}
         had: set[str] = set()
         while further and seeds and not self.stopped:
@@ -123,7 +121,7 @@ class _Search:
 
     def _round(self, what: str, rows: Sequence[Row], numbers: Sequence[int], factor: float = 1.0) -> None:
         """Run these rows, as far as they came through so far, on disturbances of these numbers."""
-        again = {row.score.name: _asked(row.candidate) for row in rows if row.used and not row.failures}
+        again = {row.score.name: row.candidate.asked for row in rows if row.used and not row.failures}
         if not again or self.stopped:
             return
         trials = [replace(self.first, observers=again, number=number, factor=factor) for number in numbers]
@@ -179,11 +177,3 @@ def _without_observers(data: dict[str, Any]) -> dict[str, Any]:
     kept["report"] = {key: value for key, value in data.get("report", {}).items() if key != "observers"}
     kept.pop("expect", None)
     return kept
-
-
-def _asked(candidate: BenchmarkCandidate) -> Any:
-    """What names an observer for another run."""
-    model = candidate.table.observer
-    if candidate.origin == "scenario" or model is None:
-        return candidate.name
-    return model if model.stated is not None else str(candidate.table.label)

@@ -20,6 +20,9 @@ from cosim.runs.job import Ended, Failure, Job
 from cosim.runs.keys import digest, table_content
 from cosim.simulation.scenario import Scenario
 
+HARDER = 2.0
+"""How much larger all disturbances are in the runs that do not count."""
+
 
 @dataclass(frozen=True)
 class Trial(Job):

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import argparse
 import logging
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from cosim.choice.allowance import Allowance
 from cosim.choice.choice import INTERRUPTED, Choice
 from cosim.choice.choose import FURTHER, SEEDS, choose, scenario_for_fmu
+from cosim.choice.replayed_run import replayed
+from cosim.choice.trial import Trial
 from cosim.cli.arguments import FIGURE_FILES, QUIET, settings_argument
 from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import load_scenario
@@ -36,7 +40,11 @@ GROUP = "Observers"
 PLACE = 1
 HELP = "which observer to use beside a train, how good it is, and why not the others"
 FORMER = {"benchmark-observers": "cosim choose SCENARIO"}
-EXAMPLES = ("cosim choose vendor.fmu", "cosim choose vendor.toml --write chosen.toml")
+EXAMPLES = (
+    "cosim choose vendor.fmu",
+    "cosim choose vendor.toml --write chosen.toml",
+    "cosim choose vendor.toml --observers odometer_reset --replay 3 --write third.toml",
+)
 PARSER = {
     "description": (
         "Run the train of a scenario, or a plant FMU, and play it back to every preset of all train observers side by "
@@ -77,6 +85,12 @@ ARGUMENTS = (
         argument("--record", metavar="DIR", help="keep the nominal run as a results folder"),
         argument("--from", metavar="DIR", dest="recorded", help="play back this results folder instead of new runs"),
     ),
+    argument(
+        "--replay",
+        metavar="RUN",
+        help="one run again, of the one observer of --observers: the number of a seed, harder:NUMBER or nominal; "
+        "--write then writes the scenario that plays it, in which cosim run shows the same error",
+    ),
     argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1)"),
     argument("--write", type=Path, metavar="FILE", help="write the scenario with the observer in it"),
     argument("--force", action="store_true", help="replace the file of --write where it exists"),
@@ -97,6 +111,8 @@ def execute(options: argparse.Namespace) -> Output:
         if folder is not None:
             check_writable(folder)
     with ProgressBar("run", silent=options.quiet or options.json, lines_after=0.0) as bar:
+        if options.replay is not None:
+            return _replayed(options, bar)
         choice = _chosen(options, bar)
     files: dict[str, Path] = {}
     if options.write is not None and choice.found and not choice.stopped:
@@ -106,7 +122,7 @@ def execute(options: argparse.Namespace) -> Output:
     verdict = choice.answer if choice.found else ""
     safe = choice.found and choice.best.safe
     return Output(
-        choice.parts(),
+        [*choice.parts(), _again(choice)],
         choice.to_data(),
         files,
         code=_DONE if safe else _NOTHING_SAFE,
@@ -114,6 +130,34 @@ def execute(options: argparse.Namespace) -> Output:
         verdict=verdict,
         role="good" if safe else "bad",
     )
+
+
+def _again(choice: Choice) -> str:
+    """How the worst run of the best observer is done again, in a line; empty where there is none."""
+    if not choice.found:
+        return ""
+    run, name = choice.best.worst[0].removeprefix("seed "), choice.best.candidate.asked
+    return f"Its worst run as a scenario: the same command with --observers {name} --replay {run} --write worst.toml"
+
+
+def _replayed(options: argparse.Namespace, bar: ProgressBar) -> Output:
+    """One run again, and the scenario of it.
+
+    Raises:
+        CosimError: there is no such run, or not one observer is named.
+    """
+    if len(options.observers or ()) != 1:
+        raise ScenarioError("--replay does a run of one observer again: say which with --observers NAME.")
+    if options.out is not None:
+        raise OutputError("--replay makes no page: write its scenario by --write FILE.toml, and cosim run makes one.")
+    allowance = Allowance() if options.allowance is None else Allowance.of(options.allowance)
+    trial = Trial(_scenario(options), options.observers, allowance, recorded=options.recorded)
+    with tempfile.TemporaryDirectory() as scratch:
+        beside = scratch if options.write is None else options.write.with_suffix("").as_posix() + "_recording"
+        folder = Path(options.record or beside)
+        found = replayed(trial, options.replay, folder, building=_building(options, bar))
+        files = {} if options.write is None else {"scenario": found.scenario.save(options.write)}
+    return Output(found.parts(), found.to_data(), files, verdict=found.answer, role="good" if found.safe else "bad")
 
 
 def _error(choice: Choice) -> BaseException | None:
@@ -125,11 +169,17 @@ def _error(choice: Choice) -> BaseException | None:
     return None if choice.found else RunError(choice.answer)
 
 
-def _chosen(options: argparse.Namespace, bar: ProgressBar) -> Choice:
+def _building(options: argparse.Namespace, bar: ProgressBar) -> Callable[[str], None]:
+    """Prints which observers are compiled."""
+
     def notice(text: str) -> None:
         bar.clear()
         print_notice(text)
 
+    return ignore if options.quiet else notice
+
+
+def _chosen(options: argparse.Namespace, bar: ProgressBar) -> Choice:
     more: dict[str, Any] = {
         "seeds": options.seeds,
         "further": options.further,
@@ -139,7 +189,7 @@ def _chosen(options: argparse.Namespace, bar: ProgressBar) -> Choice:
         "workers": options.workers,
         "progress": lambda what, done, total: bar(done, total, what),
         "warn": logging.getLogger("cosim").warning,
-        "building": ignore if options.quiet else notice,
+        "building": _building(options, bar),
     }
     return choose(_scenario(options), options.observers, **more)
 

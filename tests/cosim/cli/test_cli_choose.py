@@ -63,6 +63,21 @@ def test_where_nothing_is_safe_the_verdict_comes_last_with_exit_code_1_and_an_al
     assert capsys.readouterr().out.splitlines()[-1].startswith("use odometer_reset")
 
 
+def test_a_run_again_writes_the_scenario_that_plays_it(
+    scenario: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written = tmp_path / "third.toml"
+    asked = ["choose", scenario, "--observers", "odometer_reset", "--replay", "3", "--quiet"]
+    assert main([*asked, "--write", str(written)]) == 0
+    shown = capsys.readouterr().out
+    assert shown.splitlines()[-1].startswith("odometer_reset in seed 3: at most ")
+    assert "wheel of the odometer" in shown
+    assert (tmp_path / "third_recording" / "summary.json").is_file()
+    assert main(["run", str(written), "--quiet"]) == 0
+    assert main([*asked, "--json", "--out", str(tmp_path)]) == 2
+    assert "cosim run makes one" in capsys.readouterr().err
+
+
 def test_the_former_name_says_what_is_typed_now(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["benchmark-observers", scenario])
@@ -84,6 +99,8 @@ def test_where_nothing_comes_through_it_is_an_error_with_the_reasons(
         (["--set", "balises.layout=recorded"], "layout 'recorded' needs 'file'"),
         (["--allowance", "five"], "allowance 'five': expected metres plus per cent of the distance"),
         (["--seeds", "-1"], "seeds must not be negative, got -1"),
+        (["--replay", "3"], "--replay does a run of one observer again: say which with --observers NAME"),
+        (["--replay", "last", "--observers", "odometer_reset"], "run 'last': expected the number of a seed"),
     ],
 )
 def test_mistakes_are_exit_code_2_in_words(
