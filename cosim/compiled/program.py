@@ -27,6 +27,7 @@ from cosim.errors import CosimError
 from cosim.master.axis import TimeAxis
 from cosim.master.interpolation.interpolators import MeanInterpolator
 from cosim.process.last_call import LAST_CALL
+from fmus.fmi.call_warnings import CONTRADICTIONS
 from fmus.fmi.elements import Element
 from fmus.fmi.ports import is_native
 from fmus.fmi.types import CTYPES, c_type, getter_type, size
@@ -173,7 +174,7 @@ class Program:
         return said
 
     def hand_over_warnings(self, which: int, component: Component) -> None:
-        """Add the warnings of a slave that were counted here to those of its component.
+        """Add the warnings and contradictions of a slave that were counted here to those of its component.
 
         Args:
             which: its place in the plan. component: whose slave it is.
@@ -185,6 +186,11 @@ class Program:
                 name = call.function(version) or " or ".join(ports[which])
                 component.call_warnings.add(name, float(slave.first_warnings[call]), int(slave.warnings[call]))
                 slave.warnings[call] = 0
+        for place, text in enumerate(CONTRADICTIONS):
+            if slave.contradictions[place]:
+                first = float(slave.first_contradictions[place])
+                component.contradictions.add(text, first, int(slave.contradictions[place]))
+                slave.contradictions[place] = 0
 
     def journalled(self) -> dict[int, dict[str, list[RecordedReturn]]]:
         """What slaves have said since the journal was begun: by place in the plan, then by function, in order."""
@@ -206,6 +212,7 @@ class Program:
         made = CSlave(instance=instance, fmi_version=component.fmi_version)
         made.do_step = self.function(component, f"fmi{component.fmi_version}DoStep")
         made.numbers = LAST_CALL.numbers(component.name)
+        made.returns_early = component.capabilities.mightReturnEarlyFromDoStep
         made.usual_step, made.rounding = component.usual_step, component.rounding
         made.heeds_events = bool(getattr(component, "has_event_mode", False))
         writes, names = self._ports(component, "Set", inputs.names, inputs.buffer)

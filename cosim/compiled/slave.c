@@ -61,13 +61,23 @@ static bool called_step(Program *program, const Slave *slave, double t, double h
     bool event = false, terminate = false, early = false;
     double reached = t + h; /* for slaves that do not fill it in */
     program->status = ((DoStep3)slave->do_step)(slave->instance, t, h, false, &event, &terminate, &early, &reached);
-    if (program->status <= STATUS_WARNING && !terminate && !early && !(event && slave->heeds_events))
-        return true;
     program->event = event;
     program->terminate = terminate;
     program->early = early;
     program->reached = reached;
-    return false;
+    return program->status <= STATUS_WARNING && !terminate && !early && !(event && slave->heeds_events);
+}
+
+static void contradicts(Slave *slave, int64_t which, bool wrong, double t) {
+    if (wrong && slave->contradictions[which]++ == 0)
+        slave->first_contradictions[which] = t;
+}
+
+/* Count what the last step, from `t` to `until` [s], said that it must not; what is left to Python is counted there. */
+static void note_contradictions(const Program *program, Slave *slave, double t, double until) {
+    contradicts(slave, BEYOND_STEP, !program->early && program->reached > until + TIME_TOLERANCE, t);
+    contradicts(slave, EARLY_RETURN, program->early && !slave->returns_early, t);
+    contradicts(slave, EVENT_WITHOUT_MODE, program->event && !slave->heeds_events, t);
 }
 
 static void about_to(const Program *program, const Slave *slave, int64_t what) {
@@ -107,7 +117,10 @@ static bool do_step(Program *program, int64_t which, double t, double until) {
         accepted(program, which, CALL_STEP);
         if (program->journal.on)
             note_step(program, which, ordinary);
-        if (ordinary || !returned_early(program, slave, t, until))
+        const bool goes_on = !ordinary && returned_early(program, slave, t, until);
+        if (slave->fmi_version == 3 && (ordinary || goes_on))
+            note_contradictions(program, slave, t, until);
+        if (!goes_on)
             return ordinary;
         if (program->return_count == RETURNS_AT_MOST || (program->journal.on && program->journal.count >= program->journal.returns_up_to))
             return false;

@@ -81,6 +81,9 @@ enum {
     CALL_RESTORE, CALL_RELEASE, CALLS,
 };
 
+/* What a step may say against the standard or the description, as in `call_warnings.py`. */
+enum { BEYOND_STEP, EARLY_RETURN, EVENT_WITHOUT_MODE, CONTRADICTIONS };
+
 typedef struct {
     void *instance;
     void *do_step;
@@ -104,6 +107,9 @@ typedef struct {
     double seconds_over;
     int64_t returns_here, returns;     /* calls of doStep after an early return: in the present step; in all steps but those of events */
     int64_t numbers;                   /* of its calls, as `LastCall` counts them: the first one is that of setting inputs */
+    int64_t returns_early;             /* FMI 3: it declares that a step may end early */
+    int64_t contradictions[CONTRADICTIONS]; /* how often a step said what it must not */
+    double first_contradictions[CONTRADICTIONS]; /* when first [s] */
     int64_t warnings[CALLS];           /* of each function: how often it returned a warning */
     double first_warnings[CALLS];      /* when first [s] */
 } Slave;

@@ -6,6 +6,7 @@ import ctypes
 
 from cosim.compiled.journal import CJournal, StepperCall
 from cosim.diagnostics.sampled_times import BINS
+from fmus.fmi.call_warnings import CONTRADICTIONS
 
 RETURNS_AT_MOST = 256
 
@@ -38,6 +39,9 @@ class CSlave(ctypes.Structure):
         ("more_calls", ctypes.c_int64),
         ("seconds_over", ctypes.c_double),
         *((name, ctypes.c_int64) for name in ("returns_here", "returns", "numbers")),
+        ("returns_early", ctypes.c_int64),
+        ("contradictions", ctypes.c_int64 * len(CONTRADICTIONS)),
+        ("first_contradictions", ctypes.c_double * len(CONTRADICTIONS)),
         ("warnings", ctypes.c_int64 * len(StepperCall)),
         ("first_warnings", ctypes.c_double * len(StepperCall)),
     )

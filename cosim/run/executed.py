@@ -108,6 +108,8 @@ def _warnings_after(
     for name, component in components.items():
         if component.call_warnings:
             yield f"{name} returned the status warning, and the run went on: {component.call_warnings}."
+        if component.contradictions:
+            yield f"{name} said in doStep what it must not, and the run went on: {component.contradictions}."
     for name, component in components.items():
         wrong = {status: count for status, count in component.messages.counts.items() if status in FAULTS}
         if wrong:

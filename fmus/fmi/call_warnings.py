@@ -1,33 +1,35 @@
-"""Warnings of calls: how often the functions of an instance returned the status warning, which is no failure."""
+"""Warnings of calls: how often the functions of an instance returned the status warning, which is no failure, or said
+what its description does not allow.
+"""
 
 from __future__ import annotations
 
 import math
 
-from fmus.fmi.described import Described
-from fmus.fmi.ports import is_native
+BEYOND_STEP = "a time beyond the end of the step, without an early return"
+EARLY_RETURN = "an early return without mightReturnEarlyFromDoStep"
+EVENT = "an event without hasEventMode"
+CONTRADICTIONS = (BEYOND_STEP, EARLY_RETURN, EVENT)
+"""What a doStep may say against the standard or its description; the compiled stepper counts them in this order."""
 
 _MOST_NAMED = 4
 
 
 class CallWarnings:
-    """Functions that returned a warning, each with how often it did, and where the instance stood at the first one.
-
-    Args:
-        instance: whose slave notifies of them, where it is a library.
+    """Functions that returned a warning, or what they said, each with how often it did, and where the instance stood
+    at the first one.
     """
 
-    def __init__(self, instance: Described) -> None:
+    def __init__(self) -> None:
         self.calls: dict[str, tuple[int, float]] = {}
-        if is_native(instance.slave):
-            instance.slave.warned = lambda function: self.add(function, getattr(instance, "time", math.nan))
 
     def add(self, function: str, time: float, count: int = 1) -> None:
         """Count warnings.
 
         Args:
-            function: of the standard, e.g. ``fmi2DoStep``. time: where the instance stood at the first of them [s]; NaN
-                before initialisation. count: how many.
+            function: of the standard, e.g. ``fmi2DoStep``, or of `CONTRADICTIONS`.
+            time: where the instance stood at the first of them [s]; NaN before initialisation.
+            count: how many.
         """
         known, first = self.calls.get(function, (0, time))
         self.calls[function] = known + count, first if math.isnan(first) else min(first, time)  # NaN is before all

@@ -8,6 +8,7 @@ from typing import Any
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 
+from fmus.fmi.call_warnings import BEYOND_STEP
 from fmus.fmi.described import EventPort
 from fmus.fmi.instance import Instance
 from fmus.fmi.native_log import fmi2_callbacks
@@ -87,6 +88,8 @@ class FMI2Slave(FMI2Instance, WholeStepSlave):
         reached = status_of(self.slave.getRealStatus, fmi2LastSuccessfulTime)
         if not status_of(self.slave.getBooleanStatus, fmi2Terminated):  # one that cannot say why has not terminated
             raise self._not_done(error, t, until, reached) from error
+        if reached is not None and reached > until + TIME_TOLERANCE:
+            self.contradictions.add(BEYOND_STEP, t)
         self.time = t if reached is None else min(max(float(reached), t), until)
         if self.time <= t + TIME_TOLERANCE and self._says_why():
             raise self.explained("doStep", error, t) from error  # it did nothing

@@ -10,6 +10,7 @@ from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from fmus.fmi.call_warnings import BEYOND_STEP, EARLY_RETURN, EVENT
 from fmus.fmi.clocks import ClockSchedule, clock_references
 from fmus.fmi.described import EventPort
 from fmus.fmi.instance import Instance
@@ -116,6 +117,8 @@ class FMI3Slave(FMI3Instance, Slave):
         finally:
             self.seconds += perf_counter() - begin
             self.calls += 1
+        if event or early or reached > until + TIME_TOLERANCE:
+            self._note_contradictions(t, bool(event), bool(early), reached > until + TIME_TOLERANCE)
         if terminate:
             self.terminated = True
             # a slave that stops on the way says where
@@ -128,6 +131,18 @@ class FMI3Slave(FMI3Instance, Slave):
             raise self.failure(f"doStep to {until:g} s says that it reached {reached!r} s", t)
         self.time = min(max(float(reached), t), until)
         return self.time, event
+
+    def _note_contradictions(self, t: float, *said: bool) -> None:
+        """Count what a step from `t` [s] said that it must not: event, early return, beyond its end."""
+        event, early, beyond = said
+        declared = self.capabilities
+        for text, wrong in (
+            (BEYOND_STEP, beyond and not early),
+            (EARLY_RETURN, early and not declared.mightReturnEarlyFromDoStep),
+            (EVENT, event and not self.has_event_mode),
+        ):
+            if wrong:
+                self.contradictions.add(text, t)
 
     def _step_failed(self, error: Exception, t: float, until: float) -> Exception:
         if getattr(error, "status", None) != DISCARD:

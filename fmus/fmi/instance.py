@@ -6,6 +6,7 @@ throws comes out as one kind of error, which the subclass makes in `failure`.
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -54,7 +55,9 @@ class Instance(Described):
         self.failed_ends: list[str] = []
         self.terminated = self._alive = self._running = False
         self._loaded = is_native(slave)
-        self.call_warnings = CallWarnings(self)
+        self.call_warnings, self.contradictions = CallWarnings(), CallWarnings()
+        if self._loaded:
+            slave.warned = lambda function: self.call_warnings.add(function, getattr(self, "time", math.nan))
 
     @property
     def running(self) -> bool:

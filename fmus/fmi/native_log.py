@@ -2,15 +2,15 @@
 
 That logger takes arguments as C's printf does, which Python cannot receive; fmpy brings a small library that fills them
 in and then calls one function of the whole process. So one function takes the messages of all FMUs here and finds out
-whose they are: in FMI 2.0 by the environment handed to the FMU, in FMI 1.0 by its instance name. Where a platform has
-no such library, messages arrive as written.
+whose they are by the instance name that each message brings. The environment of an instance of FMI 2.0 is NULL; only
+where another one of the same name lives it is a pointer, to memory of zeros, by which the two are distinguished. Where
+a platform has no such library, messages arrive as written.
 """
 
 from __future__ import annotations
 
 import ctypes
 from contextlib import suppress
-from itertools import count
 from typing import Any, Protocol
 
 from fmpy import fmi1
@@ -32,13 +32,16 @@ class _Listener(Protocol):
         """
 
 
-_numbers = count(1)
-_listeners: dict[int, _Listener] = {}
+_listeners: list[_Listener] = []
+_environments: dict[int, tuple[_Listener, Any]] = {}
+_ENVIRONMENT_BYTES = 4096
+"""More than an FMU reads of what it takes for its environment."""
 
 
 def fmi1_callbacks(listener: _Listener) -> Any:
     """Callbacks for an instance of FMI 1.0; `forget` the listener once it is freed."""
-    _listen(listener)
+    forget(listener)
+    _listeners.append(listener)
     made = fmi1CallbackFunctions()
     # the logger is the first field
     ctypes.memmove(ctypes.byref(made), ctypes.byref(_shared), ctypes.sizeof(ctypes.c_void_p))
@@ -62,21 +65,26 @@ def forget(listener: _Listener) -> None:
     Args:
         listener: who took them until now.
     """
-    for number in [n for n, known in _listeners.items() if known is listener]:
-        del _listeners[number]
+    _listeners[:] = [known for known in _listeners if known is not listener]
+    for address in [address for address, (known, _) in _environments.items() if known is listener]:
+        del _environments[address]
 
 
-def _listen(listener: _Listener) -> int:
+def _listen(listener: _Listener) -> int | None:
+    """The environment to hand over."""
     forget(listener)
-    number = next(_numbers)
-    _listeners[number] = listener
-    return number
+    if any(known.name == listener.name for known in _listeners):
+        memory = ctypes.create_string_buffer(_ENVIRONMENT_BYTES)
+        _environments[ctypes.addressof(memory)] = listener, memory
+        return ctypes.addressof(memory)
+    _listeners.append(listener)
+    return None
 
 
 def _take_message(
     environment: int | None, name: bytes | None, status: int, category: bytes | None, message: bytes | None
 ) -> None:
-    listener = _listeners.get(environment or 0) or _named(name)
+    listener, _ = _environments.get(environment or 0) or (_named(name), None)
     if listener is not None:
         listener.note(message, status, category)
     else:
@@ -85,9 +93,10 @@ def _take_message(
 
 
 def _named(name: bytes | None) -> _Listener | None:
-    """The newest instance of this name: while an FMU is probed there are two."""
+    """The instance of this name. One that names itself otherwise is the only one there is, if it is that."""
     wanted = (name or b"").decode("utf-8", "replace")
-    return next((known for known in reversed(_listeners.values()) if known.name == wanted), None)
+    alone = _listeners[0] if len(_listeners) == 1 else None
+    return next((known for known in reversed(_listeners) if known.name == wanted), alone)
 
 
 def _share() -> Any:

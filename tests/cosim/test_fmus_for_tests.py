@@ -128,7 +128,7 @@ def test_the_sources_compile_without_warnings(folder: Path) -> None:
     for version in (1, 2, 3):
         for source in sorted(SOURCES.glob("*.c")):
             can = {key: source.name == "linear.c" for key in DEFAULTS if key.startswith("HAS_")}
-            for behaviour in range(1, 12) if source.name == "awkward.c" else (0,):
+            for behaviour in range(1, 14) if source.name == "awkward.c" else (0,):
                 place = folder / f"warnings_{version}_{source.stem}_{behaviour}"
                 place.mkdir()
                 here = {"HAS_EVENT_MODE": version == 3, "BEHAVIOUR": behaviour, "INNER_INSTANTS": 2 * (version == 3)}

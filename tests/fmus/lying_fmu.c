@@ -104,6 +104,10 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String location,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
+#ifdef LIE_READS_ENVIRONMENT /* no lie: it may be NULL, or memory that it may read */
+    if (functions->componentEnvironment != NULL && *(volatile int *)functions->componentEnvironment != 0)
+        return NULL;
+#endif
 #ifdef LIE_CRASH_AT_START
     abort();
 #endif

@@ -217,6 +217,10 @@ def test_steps_that_must_be_refused(tmp_path: Path) -> None:
     assert "accepts a step of -0.01 s instead of refusing it" in report.finding("negative step").detail
 
 
+def test_the_environment_of_an_instance_may_be_read(tmp_path: Path) -> None:
+    assert problems(checked(tmp_path, "READS_ENVIRONMENT")) == {}
+
+
 def test_what_is_not_declared_is_not_tried(tmp_path: Path) -> None:
     report = checked(tmp_path, "UNSHORTENED", "NO_STATE_SYMBOLS", xml=description({}))
     reasons = {f.check: f.detail for f in report.findings if f.verdict is SKIPPED}

@@ -326,6 +326,8 @@ Behaviour = Literal[
     "dies",
     "waits",
     "exact-steps",
+    "overshoots",
+    "cries",
 ]
 _CODES = {
     "quit": 1,
@@ -340,6 +342,8 @@ _CODES = {
     "waits": 9,
     "own-steps": 10,
     "exact-steps": 11,
+    "overshoots": 12,
+    "cries": 13,
 }
 
 
@@ -353,6 +357,7 @@ def awkward_fmu(
     longest_step: float = 0.04,
     every: float = 0.1,
     early: bool = True,
+    declares_early: bool = True,
 ) -> Path:
     """An integrator, ``y' = u`` (y = 0 at the start), that does something awkward at the time `at` [s].
 
@@ -365,11 +370,12 @@ def awkward_fmu(
             3.0's lastSuccessfulTime, and does not return early; ``chatty`` logs at `at`, `at` + `every`, ..., see
             `chatter`; ``warns``: every step returns a warning; ``fails``, ``dies``: error or fatal in the step over
             `at`; ``waits``: pending there (FMI 1.0, 2.0); ``exact-steps`` refuses a step that is no whole multiple of
-            ``u``, to the last bit.
-        early: it may return early.
+            ``u``, to the last bit; ``overshoots`` says from `at` on that it stands a step beyond the end of each step,
+            ``cries`` that there is an event at `at` (FMI 3.0).
+        early: it may return early. declares_early: and says so.
     """
     event_mode = behaviour == "quit-in-event" and version == 3
-    returns_early = version == 3 and early and behaviour in ("quit", "quit-in-event", "short")
+    returns_early = declares_early and version == 3 and early and behaviour in ("quit", "quit-in-event", "short")
     flags = capability_flags(version, event_mode=event_mode, might_return_early=returns_early)
     if behaviour == "waits":
         flags["canRunAsynchronuously"] = "true"

@@ -10,7 +10,7 @@ from fmpy.model_description import ModelVariable
 
 from fmus.check.check import LIMIT, NOTE, Check
 from fmus.check.checked_instance import SlaveError
-from fmus.check.checks.life_checks import SHARE_OF_BUDGET, listed
+from fmus.check.checks.life_checks import SHARE_OF_BUDGET, by, listed
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, failed, noted, passed
 from fmus.check.runner import SLOW_STEPS, elsewhere
@@ -80,6 +80,24 @@ class ValuesTakenCheck(Check, failing=LIMIT, advice="do not set these: it comput
         if found:
             return failed(f"does not take what it is set: {listed([str(one) for one in found])}")
         return passed("parameters and inputs have what they were set")
+
+
+class ContradictionsCheck(
+    Check,
+    failing=LIMIT,
+    advice="do not rely on its own word: steps go to where they are asked to, and its events reach nobody",
+    place=6.3,
+):
+    """Steps say nothing that the standard or the description forbids, under the start values of the inputs."""
+
+    name = "word of steps"
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        with context.begun_runner() as runner:
+            runner.steps_at_most(min(SLOW_STEPS, context.steps))
+            said = runner.component.contradictions
+        return by(f"doStep says what it must not: {said}" if said else "", "steps say nothing that they must not")
 
 
 class WarningsCheck(Check, failing=NOTE, place=6.4):

@@ -13,6 +13,8 @@
 #define DIES 8        /* fatal error in the step over AT */
 #define WAITS 9       /* pending (FMI 1 and 2) */
 #define EXACT_STEPS 11 /* refuses a step that is no whole multiple of u, to the last bit */
+#define OVERSHOOTS 12 /* says from AT on that it stands beyond the end of the step */
+#define CRIES 13      /* says in the step over AT that there is an event */
 #define OWN_STEPS 10  /* moves in whole steps of LONGEST_STEP, and waits at the last one of them before the end of a step */
 
 typedef struct {
@@ -78,6 +80,10 @@ static Outcome model_step(Model *m, Host *host, double t, double until) {
     m->time = until;
     outcome.lag = until - m->moved_to;
     return outcome;
+#elif BEHAVIOUR == OVERSHOOTS
+    outcome.lag = t > AT - SAME ? t - until : 0.0;
+#elif BEHAVIOUR == CRIES
+    outcome.event = over;
 #elif BEHAVIOUR == EXACT_STEPS
     if (host->length != round(host->length / m->u) * m->u) {
         SAY(host, ERROR, "logStatusError", "a step of %.17g s is no multiple of %.17g s", host->length, m->u);
