@@ -1,5 +1,5 @@
-"""Starter scenarios: a commented scenario file for an FMU, from what its description says. Nothing of the FMU is
-executed.
+"""Starter scenarios: a commented scenario file for an FMU, from what its description says, and from short
+runs of one that says too little.
 """
 
 from plant_models.registry import lazy_names

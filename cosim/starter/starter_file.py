@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,8 @@ from cosim.scenario.paths import move_file, relative
 from cosim.scenario.schema import step_count
 from cosim.simulation.scenario import Scenario
 from cosim.starter.guessed_signal import Guess
-from cosim.starter.inspected_fmu import InspectedFmu, inspect_fmu, number
+from cosim.starter.inspected_fmu import InspectedFmu, number
+from cosim.starter.known_facts import find_facts
 from cosim.starter.starter_roles import ObserverRoles, PlantRoles, is_observer, observer_roles, plant_roles
 from cosim.starter.toml_lines import LISTED, GuessedLink, comment, entry, guessed, inline, listing, one_line
 from cosim.starter.train_starter import declared_observer, default_observer, train, train_times
@@ -140,25 +141,43 @@ class Starter:
     remarks: list[str]
 
 
-def starter(fmu: str | Path, target: str | Path, observer: str | None = None) -> Starter:
-    """A starter scenario for an FMU; nothing is written and nothing of the FMU is executed.
+@dataclass(frozen=True)
+class StarterWishes:
+    """How a starter is to be made.
 
     Args:
-        fmu: path of the FMU.
-        target: the scenario file to be; paths in the text are relative to it.
         observer: name of the observer to put beside a plant, or ``file.py:Class``; by default `quasi_lpv_uio`, and
             `odometer_reset` beside a plant without an effort.
+        assumed: what is known of the FMU's variables, as ``vIst=km/h``, ``Fsoll=effort,kN`` or ``x=-m/s`` each.
+        probe: whether an FMU that declares too little is run for some seconds, in a process of its own.
+    """
+
+    observer: str | None = None
+    assumed: Sequence[str] = ()
+    probe: bool = True
+
+
+USUAL = StarterWishes()
+
+
+def starter(fmu: str | Path, target: str | Path, wishes: StarterWishes = USUAL) -> Starter:
+    """A starter scenario for an FMU; nothing is written. An FMU that declares its units is not executed.
+
+    Args:
+        fmu: path of the FMU. target: the scenario file to be; paths in the text are relative to it. wishes: see there.
 
     Returns:
         The text of the file, and what the user should know.
 
     Raises:
-        FmuLoadError: the FMU cannot be read, or offers no co-simulation.
+        FmuLoadError: the FMU cannot be read, or offers no co-simulation. CouplingError: what is assumed cannot be.
         ScenarioError: there is no such observer, or it does not listen to an odometer.
     """
+    observer = wishes.observer
     _check_observer(observer)
     path, target = Path(fmu), Path(target)
-    inspected = inspect_fmu(path)
+    known = find_facts(path, wishes.assumed, probing=wishes.probe)
+    inspected = known.inspected
     place = relative(path, target.parent)
     roles = plant_roles(inspected)
     beside = observer or default_observer(roles)
@@ -166,25 +185,21 @@ def starter(fmu: str | Path, target: str | Path, observer: str | None = None) ->
     if is_observer(inspected):
         kind, values = "observer", _observer_beside(inspected, observer_roles(inspected))
     elif roles.is_train:
-        kind, values = (
-            "train",
-            train(inspected, roles, beside, written),
-        )
+        kind, values = "train", train(inspected, roles, beside, written, known.radius)
     else:
         kind, values = "alone", alone(inspected)
-    known = {"inspected": inspected, "fmu": place, "target": target.name, "about": _about(inspected), "listed": LISTED}
-    text = _render(kind, guesses=kind != "alone", **known, **values)
-    return Starter(text, kind, list(_remarks(inspected, kind, roles, observer)))
+    shared = {"inspected": inspected, "fmu": place, "target": target.name, "about": _about(inspected), "listed": LISTED}
+    text = _render(kind, guesses=kind != "alone", known=known, **shared, **values)
+    return Starter(text, kind, [*known.remarks, *_remarks(inspected, kind, roles, observer)])
 
 
-def write_starter(fmu: str | Path, target: str | Path, observer: str | None = None, *, force: bool = False) -> Starter:
-    """Write a starter scenario for an FMU; nothing of the FMU is executed.
+def write_starter(
+    fmu: str | Path, target: str | Path, wishes: StarterWishes = USUAL, *, force: bool = False
+) -> Starter:
+    """Write a starter scenario for an FMU, see `starter`.
 
     Args:
-        fmu: path of the FMU.
-        target: the scenario file; paths in it are relative to it.
-        observer: name of the observer to put beside a plant, or ``file.py:Class``; by default `quasi_lpv_uio`, and
-            `odometer_reset` beside a plant without an effort.
+        fmu: path of the FMU. target: the scenario file; paths in it are relative to it. wishes: see there.
         force: replace a file that exists.
 
     Returns:
@@ -192,13 +207,12 @@ def write_starter(fmu: str | Path, target: str | Path, observer: str | None = No
 
     Raises:
         OutputError: the file exists, or cannot be written.
-        FmuLoadError: the FMU cannot be read, or offers no co-simulation.
-        ScenarioError: there is no such observer, or it does not listen to an odometer.
+        CosimError: as `starter`.
     """
     target = Path(target)
     if target.suffix != ".toml":
         raise OutputError(f"{target}: a scenario file ends in .toml.")
-    made = starter(fmu, target, observer)  # first, since without an FMU there is nothing to write
+    made = starter(fmu, target, wishes)  # first, since without an FMU there is nothing to write
     if target.exists() and not force:
         raise OutputError(f"{target} exists already; choose another name with -o, or replace it with --force.")
     try:

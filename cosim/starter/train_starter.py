@@ -51,13 +51,16 @@ def default_observer(roles: PlantRoles) -> str:
     return WITHOUT_EFFORT if roles.effort is None and roles.applied is None else DEFAULT_OBSERVER
 
 
-def train(inspected: InspectedFmu, roles: PlantRoles, observer: str, place: str) -> dict[str, Any]:
+def train(
+    inspected: InspectedFmu, roles: PlantRoles, observer: str, place: str, radius: float | None = None
+) -> dict[str, Any]:
     """What the template of this starter inserts.
 
     Args:
         inspected: what the FMU says.
         roles: what its signals were guessed to be.
         observer: name of the observer, or ``file.py:Class``. place: the same as the scenario file says it.
+        radius: of the wheels [m]; None where it is not known.
 
     Returns:
         Values by name.
@@ -75,7 +78,7 @@ def train(inspected: InspectedFmu, roles: PlantRoles, observer: str, place: str)
         "span": span,
         "step": step,
         "source": source,
-        "links": _links(roles, {signal.name for signal in declared.inputs}),
+        "links": _links(roles, {signal.name for signal in declared.inputs}, radius),
         "roles": roles,
         "others": [s for s in inspected.inputs if s.name != driven],
         "settings": [s for s in inspected.parameters if s.start is not None and not s.name.endswith("]")],
@@ -162,7 +165,7 @@ def _own_span(inspected: InspectedFmu, stop: float, step: float) -> tuple[float,
 # -- connections ------------------------------------------------------------------------------------------------------
 
 
-def _links(roles: PlantRoles, wanted: Set[str]) -> list[GuessedLink]:
+def _links(roles: PlantRoles, wanted: Set[str], radius: float | None) -> list[GuessedLink]:
     """Connections of the train, its odometer and its driver, and to the inputs that an observer wants."""
     links: list[GuessedLink] = []
     effort = f"{OBSERVER}.effort"
@@ -171,7 +174,7 @@ def _links(roles: PlantRoles, wanted: Set[str]) -> list[GuessedLink]:
     elif roles.applied is not None and "effort" in wanted:
         found = roles.applied
         links.append(GuessedLink(f"{PLANT}.{found.signal.name}", [effort], guessed(found), _factor(found)))
-    links.append(_to_odometer(roles))
+    links.append(_to_odometer(roles, radius))
     readers = ["driver.odometer"] if roles.effort is not None else []
     links.append(GuessedLink("odometer.reading", [*readers, f"{OBSERVER}.odometer"]))
     if roles.effort is not None and "effort" in wanted:
@@ -189,7 +192,7 @@ def _from_driver(effort: Guess) -> GuessedLink:
     return GuessedLink("driver.effort", [f"{PLANT}.{effort.signal.name}"], remark, factor)
 
 
-def _to_odometer(roles: PlantRoles) -> GuessedLink:
+def _to_odometer(roles: PlantRoles, radius: float | None) -> GuessedLink:
     found = roles.wheel_speed or roles.speed
     assert found is not None
     signal, remark = found.signal, guessed(found)
@@ -197,8 +200,10 @@ def _to_odometer(roles: PlantRoles) -> GuessedLink:
         remark += "; no speed of a wheel was found, so this odometer never slips"
     if fits(signal, "rad/s"):
         assert signal.meaning is not None
-        remark += f"; times the wheel radius, {RADIUS} m: WRITE YOURS"
-        return GuessedLink(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, RADIUS * signal.meaning.factor)
+        seen = f"{radius:g} m by a probe run" if radius else f"{RADIUS} m: WRITE YOURS"
+        remark += f"; times the wheel radius, {seen}"
+        factor = (radius or RADIUS) * signal.meaning.factor
+        return GuessedLink(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, factor)
     if signal.unit is None:
         remark += "; it declares no unit: m/s is assumed"
     factor = _factor(found)

@@ -14,7 +14,7 @@ import pytest
 import plant_models
 from cosim.cli import main
 from cosim.simulation.scenario import Scenario
-from cosim.starter.starter_file import write_starter
+from cosim.starter.starter_file import StarterWishes, write_starter
 from fmu_observer import OBSERVERS
 from fmus import cached_fmu
 from fmus.cli import main as fmus
@@ -118,13 +118,13 @@ def test_a_starter_takes_an_observer_of_the_users(tmp_path: Path, monkeypatch: p
     monkeypatch.setattr(OBSERVERS, "_members", {**OBSERVERS.members, "gone": [PLANTS.members["gone"][0]]})
     (tmp_path / "own.py").write_text(FILTER)
     fmu = cached_fmu(recipe("locomotive"))
-    made = write_starter(fmu, tmp_path / "to" / "s.toml", f"{tmp_path}/own.py:BiasFilter")
+    made = write_starter(fmu, tmp_path / "to" / "s.toml", StarterWishes(f"{tmp_path}/own.py:BiasFilter"))
     assert tomllib.loads(made.text)["components"]["observer"]["observer"] == "../own.py:BiasFilter"
     assert Scenario.load(tmp_path / "to" / "s.toml").set("stop", 0.5).run().failure is None
     with pytest.raises(ValueError, match="No observer 'nobody' that listens"):
-        write_starter(fmu, tmp_path / "t.toml", "nobody")
+        write_starter(fmu, tmp_path / "t.toml", StarterWishes("nobody"))
     with pytest.raises(ValueError, match=r"'gone' of an installed package .* cannot be loaded"):
-        write_starter(fmu, tmp_path / "t.toml", "gone")
+        write_starter(fmu, tmp_path / "t.toml", StarterWishes("gone"))
 
 
 def test_a_plant_of_the_users_goes_into_a_package_and_back(tmp_path: Path) -> None:

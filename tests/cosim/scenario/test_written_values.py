@@ -17,7 +17,7 @@ from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
 from cosim.components.start_values import declared_start, start_values
 from cosim.errors import CosimError, CouplingError
-from cosim.starter.starter_file import write_starter
+from cosim.starter.starter_file import StarterWishes, write_starter
 
 WRITTEN: tuple[Any, ...] = (True, 0, 1, 2, -1, 3.0, 2.5, 127, 300, 2**31, 2**64 - 1, -(2**63), 1e300)
 WRITTEN += ("busy", "calmm", "00ff", "0f0", "", "3", "Zürich")
@@ -116,7 +116,7 @@ def test_a_starter_states_what_the_fmu_declares(files: dict[int, Path], tmp_path
     declared = {v.name: declared_start(v) for v in component.variables.values() if v.causality == "input"}
     declared = {name: value for name, value in declared.items() if value is not None}
     path = tmp_path / "starter.toml"
-    write_starter(files[version], path)
+    write_starter(files[version], path, StarterWishes(probe=False))
     assert len(declared) > 3
     assert declared == {name: {"u_string": "", "u_enumeration": 1}.get(name, 0) for name in declared}
     assert in_summary(cosim.Scenario.load(str(path))) == start_values(component, declared)

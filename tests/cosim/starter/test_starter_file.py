@@ -17,7 +17,7 @@ import fmu_observer
 import plant_models
 from cosim import Scenario
 from cosim.errors import FmuLoadError, OutputError, ScenarioError
-from cosim.starter.starter_file import starter, write_starter
+from cosim.starter.starter_file import StarterWishes, starter, write_starter
 from fmus import cached_fmu
 
 TIME = Variable("time", 0, "independent")
@@ -112,7 +112,7 @@ def test_without_signals_of_a_train_the_fmu_runs_alone(version: Any, tmp_path: P
     """Numbers, truth values, texts, enumerations, bytes and arrays as inputs: what can be set stands there at its start
     value.
     """
-    made = write_starter(typed_fmu(tmp_path, version=version), tmp_path / "mine.toml")
+    made = write_starter(typed_fmu(tmp_path, version=version), tmp_path / "mine.toml", StarterWishes(probe=False))
     assert made.kind == "alone"
     parameters = tomllib.loads(made.text)["components"]["fmu"]["parameters"]
     assert (parameters["u_int32"], parameters["u_boolean"], parameters["u_string"]) == (0, False, "")
@@ -225,7 +225,7 @@ def test_the_mass_is_taken_from_the_fmu_in_kg(tmp_path: Path) -> None:
         out("v", 3, "m/s"),
         Variable("Masse", 4, "parameter", start=420.0, unit="t"),
     ]
-    write_starter(described(tmp_path, *parts), tmp_path / "mine.toml", observer="discrete_uio")
+    write_starter(described(tmp_path, *parts), tmp_path / "mine.toml", StarterWishes("discrete_uio"))
     observer = valid(tmp_path / "mine.toml").table().components["observer"]
     assert (observer.observer, observer.parameters["mass"]) == ("discrete_uio", 420e3)
 
@@ -342,7 +342,7 @@ def test_a_file_that_exists_is_kept_unless_forced(tmp_path: Path) -> None:
 def test_an_observer_must_be_one_that_can_be_connected(tmp_path: Path) -> None:
     fmu = described(tmp_path, out("y", 1))
     with pytest.raises(ScenarioError, match="did you mean 'discrete_uio'"):
-        starter(fmu, tmp_path / "mine.toml", "discrete_ui")
+        starter(fmu, tmp_path / "mine.toml", StarterWishes("discrete_ui"))
     with pytest.raises(ScenarioError, match="No observer 'kalman_filter' that listens"):
-        starter(fmu, tmp_path / "mine.toml", "kalman_filter")
-    assert "discrete_uio was not used." in starter(fmu, tmp_path / "mine.toml", "discrete_uio").remarks
+        starter(fmu, tmp_path / "mine.toml", StarterWishes("kalman_filter"))
+    assert "discrete_uio was not used." in starter(fmu, tmp_path / "mine.toml", StarterWishes("discrete_uio")).remarks

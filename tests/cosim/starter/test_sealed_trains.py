@@ -1,0 +1,118 @@
+"""Trains as vendors seal them: no unit is declared, names say little, some numbers count the other way. What `cosim
+new` writes is right without an answer.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fmus
+from cosim import Scenario
+from cosim.starter.starter_file import StarterWishes, write_starter
+from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
+
+pytestmark = pytest.mark.compiler
+
+
+class _Sealed(HybridSystem):
+    """``(1.08 m) dv = F - R(v)``; what goes in and out is named and scaled by `NAMES` and `SCALES`."""
+
+    description = "sealed"
+    source = "an example"
+    states = (state("zz1", "1"), state("zz2", "1"))
+    NAMES: Mapping[str, str]
+    SCALES: Mapping[str, float]
+
+    def _motion(self, x: Any, u: Any, p: Any) -> tuple[Any, Any]:
+        mass = getattr(p, self.NAMES["mass"]) * self.SCALES["mass"]
+        v = x.zz2
+        resistance = mass * (0.01 * np.tanh(v / 0.01) + 3.6e-4 * v + 1.8e-5 * v * abs(v))
+        return v, (getattr(u, self.NAMES["effort"]) * self.SCALES["effort"] - resistance) / (1.08 * mass)
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        v, acceleration = self._motion(x, u, p)
+        return {"zz1": v, "zz2": acceleration}
+
+    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        v, acceleration = self._motion(x, u, p)
+        known = {"position": x.zz1, "speed": v, "wheel": v, "acceleration": acceleration}
+        return {name: self.SCALES[what] * known[what] for what, name in self.NAMES.items() if what in known}
+
+
+def sealed(title: str, names: Mapping[str, str], scales: Mapping[str, float], mass: float) -> HybridSystem:
+    outputs = [name for what, name in names.items() if what not in ("effort", "mass")]
+    declared = {
+        "name": title,
+        "NAMES": names,
+        "SCALES": scales,
+        "inputs": (input_signal(names["effort"], "1", 0.0),),
+        "outputs": tuple(output_signal(name, "1", "") for name in outputs),
+        "parameters": (parameter(names["mass"], "1", mass),),
+    }
+    made: HybridSystem = type(title, (_Sealed,), declared)()
+    return made
+
+
+GERMAN = sealed(
+    "zug",
+    {"effort": "Fsoll", "position": "sIst", "speed": "vIst", "wheel": "vRad", "acceleration": "aIst", "mass": "m_ges"},
+    {"effort": 1e3, "position": 1.0, "speed": 3.6, "wheel": 3.6, "acceleration": 1.0, "mass": 1e3},
+    84.0,
+)
+CRYPTIC = sealed(
+    "box",
+    {"effort": "u1", "acceleration": "y4", "wheel": "y2", "position": "y3", "speed": "y1", "mass": "p1"},
+    {"effort": -1e3, "position": 1.0, "speed": 3.6, "wheel": 1.0 / 0.46, "acceleration": 1.0, "mass": 1e3},
+    120.0,
+)
+TURNED = sealed(
+    "channels",
+    {"effort": "AO_001", "position": "AI_018", "speed": "AI_017", "acceleration": "AI_019", "mass": "K1"},
+    {"effort": 1.0, "position": -1e-3, "speed": -1.0, "acceleration": -1.0, "mass": 1.0},
+    80e3,
+)
+SHOWN = {
+    "zug": {"Fsoll": (1, "kN"), "sIst": (1, "m"), "vIst": (1, "km/h"), "vRad": (1, "km/h"), "m_ges": (1, "t")},
+    "box": {"u1": (-1, "kN"), "y3": (1, "m"), "y1": (1, "km/h"), "y2": (1, "rad/s"), "p1": (1, "t")},
+    "channels": {"AO_001": (-1, "N"), "AI_018": (1, "km"), "AI_017": (1, "m/s"), "K1": (1, "kg")},
+}
+
+
+@pytest.mark.parametrize("system", [GERMAN, CRYPTIC, TURNED], ids=lambda system: str(system.name))
+def test_a_sealed_train_is_right_at_once(system: Any, tmp_path: Path) -> None:
+    fmu = fmus.cached_fmu(system, fmi_version=2)
+    write_starter(fmu, tmp_path / "mine.toml")
+    units = tomllib.loads((tmp_path / "mine.toml").read_text())["components"]["plant"]["units"]
+    assert {name: (fact.get("sign", 1), fact["unit"]) for name, fact in units.items()} == SHOWN[system.name]
+    scenario = Scenario.load(tmp_path / "mine.toml").set("plant.record", ["zz1", "zz2"])
+    outcome = scenario.run()
+    forward = 1.0 if system is not TURNED else -1.0  # its own forward is what everybody else calls backward
+    truth = forward * outcome["plant.zz2"]
+    assert 13.0 < truth.max() < 14.5  # the driver's 50 km/h, in m/s
+    assert abs(outcome["observer.speed"] - truth)[100:].max() < 0.1
+    assert abs(outcome["observer.position"] - forward * outcome["plant.zz1"])[100:].max() < 0.5
+    names: Mapping[str, str] = system.NAMES
+    np.testing.assert_allclose(outcome[f"plant.{names['speed']}"], truth, atol=1e-9)
+
+
+def test_nothing_is_run_where_that_is_not_wanted(tmp_path: Path) -> None:
+    fmu = fmus.cached_fmu(GERMAN, fmi_version=2)
+    made = write_starter(
+        fmu, tmp_path / "mine.toml", StarterWishes(probe=False, assumed=["vIst=km/h", "Fsoll=effort,-kN"])
+    )
+    assert "nothing of it was executed" in made.text
+    units = tomllib.loads(made.text)["components"]["plant"]["units"]
+    assert units == {"vIst": {"unit": "km/h"}, "Fsoll": {"unit": "kN", "sign": -1, "meaning": "effort"}}
+
+
+def test_what_is_assumed_stands_above_what_a_run_shows(tmp_path: Path) -> None:
+    fmu = fmus.cached_fmu(CRYPTIC, fmi_version=2)
+    write_starter(fmu, tmp_path / "mine.toml", StarterWishes(assumed=["p1=kg"]))
+    units = tomllib.loads((tmp_path / "mine.toml").read_text())["components"]["plant"]["units"]
+    assert units["p1"]["unit"] == "kg"
