@@ -37,6 +37,8 @@ from fmus.tables.table import Table
 
 LOG = logging.getLogger(__name__)
 DONE, NOT_AS_ASKED, ERROR = 0, 1, 2
+_LONG = 2.0
+"""A run at least this long says where its time went [s]."""
 _ROLES: dict[str, Role] = {"good": "good", "doubt": "doubtful", "bad": "bad"}
 CALL_LOG = "calls.log"
 SEEDS = "seeds"
@@ -248,5 +250,14 @@ def _headline(summary: Any) -> str:
     how = "" if not localisation else f" Balises localised by '{localisation['method']}'."
     return (
         f"{summary['title']}: {summary['reached'] - summary['start']:g} s simulated in {summary['wall_seconds']:.2f} s "
-        f"({factor:.0f} times real time) at {summary['step']:g} s steps.{how}"
+        f"({factor:.0f} times real time) at {summary['step']:g} s steps.{_slowest(summary)}{how}"
     )
+
+
+def _slowest(summary: Any) -> str:
+    """Which component most of a long run was spent in; empty where none was."""
+    spent = {part["name"]: part["seconds"] for part in summary["components"]}
+    name = max(spent, key=spent.__getitem__, default="")
+    if not name or spent[name] < max(_LONG, 0.5 * summary["wall_seconds"]):
+        return ""
+    return f" {100.0 * spent[name] / summary['wall_seconds']:.0f} % of the time were steps of {name}."

@@ -17,6 +17,7 @@ from cosim.ssp.lapses import Lapses
 from cosim.ssp.nets import Nets, Path, Point
 from cosim.ssp.package_data import Binding, ComponentElement, Parameter, SsdElement, SsdEntry, SystemElement
 from cosim.ssp.pipe import BOOLEANS, Pipe
+from fmus.fmi.instance import shown
 from fmus.fmi.units import NamedUnit
 
 Scalar = float | str
@@ -91,6 +92,13 @@ class _Applying:
                         parameter.node, f"parameter {name!r} is {self.nothing(name, path)}, so it is ignored."
                     )
             return
+        mapped = {entry.source for entry in binding.mapping}
+        if unmapped := [name for name in parameters if name not in mapped]:
+            self.lapses.note(
+                parameters[unmapped[0]].node,
+                f"no entry of the parameter mapping takes {shown(unmapped)}, so "
+                f"{'they are' if len(unmapped) > 1 else 'it is'} not set.",
+            )
         for entry in binding.mapping:
             if entry.source not in parameters:
                 known = nearest(entry.source, parameters)

@@ -24,6 +24,7 @@ from cosim.ssp.package_data import (
     SsdElement,
     SystemElement,
 )
+from fmus.fmi.instance import shown
 from fmus.fmi.sense import doubled_names
 from fmus.fmi.units import NamedUnit
 
@@ -55,6 +56,7 @@ SOURCES = {
     "element": {"constant", "calculatedParameter", "output", "local", "inout"},
 }
 """Kinds of connectors that can drive others, of the enclosing system and of its elements."""
+_SIGNALS = ("input", "output", "inout")
 _SINKS = ("input", "inout", "parameter", "structuralParameter")
 
 
@@ -138,6 +140,7 @@ class Nets:
             p: _interface_of(e, lapses) for p, e in self.elements.items() if isinstance(e, ComponentElement)
         }
         for path, interface in self.interfaces.items():
+            self._leave_out(path, interface, lapses)
             for connector in self.elements[path].connectors.values():
                 interface.check(connector)
         self.dictionaries = self._dictionaries()
@@ -173,6 +176,30 @@ class Nets:
         if own is not None and own.unit is not None:
             return own.unit
         return self.interfaces[point.path].unit(point.name) if point.path in self.interfaces else None
+
+    def _leave_out(self, path: Path, interface: Interface, lapses: Lapses) -> None:
+        """Leave out connectors that carry nothing: their FMU has no such variable, and no connection leads to them.
+
+        Packages of Dymola have one for each parameter of the model, those that its FMU does not show included.
+        """
+        element, wires = self.elements[path], self._system(path[:-1]).wires
+        connected = {end.connector for wire in wires for end in (wire.start, wire.end) if end.element == path[-1]}
+        idle: dict[str, list[Connector]] = {}
+        for connector in element.connectors.values():
+            unknown = connector.name not in interface.variables and connector.name not in connected
+            if unknown and connector.kind not in _SIGNALS:
+                idle.setdefault(connector.kind, []).append(connector)
+        for kind, left_out in idle.items():
+            names = [connector.name for connector in left_out]
+            several = len(names) > 1
+            lapses.forgive(
+                left_out[0].node,
+                f"{len(names)} connector{'s' if several else ''} of kind {kind!r} of {interface.what} "
+                f"{'have' if several else 'has'} no variable and no connection, and {'are' if several else 'is'} left "
+                f"out: {shown(names)}.",
+            )
+            for name in names:
+                del element.connectors[name]
 
     def _dictionaries(self) -> dict[tuple[Path, str, str], list[Point]]:
         """Connectors that stand for each entry of each dictionary."""

@@ -17,6 +17,7 @@ import fmu_observer
 import plant_models
 from cosim import Scenario
 from cosim.cli import main
+from cosim.cli.run_command import _slowest
 from cosim.cli.scenarios import parse_setting
 from cosim.errors import RunError
 from cosim.results.results_folder import read_results
@@ -257,3 +258,17 @@ def test_a_usage_error_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
             main(["run", "--seeds", stated])
         assert error.value.code == 2
         assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("seconds", "wall", "said"),
+    [
+        ([133.0, 0.1], 143.2, " 93 % of the time were steps of ship."),
+        ([1.0, 0.1], 1.2, ""),  # short
+        ([3.0, 3.0], 9.0, ""),  # of no one alone
+        ([], 9.0, ""),
+    ],
+)
+def test_a_long_run_says_where_its_time_went(seconds: list[float], wall: float, said: str) -> None:
+    parts = [{"name": name, "seconds": spent} for name, spent in zip(("ship", "allocation"), seconds, strict=False)]
+    assert _slowest({"components": parts, "wall_seconds": wall}) == said

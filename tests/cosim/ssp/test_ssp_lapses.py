@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ssp_files import EXPERIMENT, connector, described_fmu, package, ramp_fmu, ssd, sum_fmu, wire
+from ssp_files import EXPERIMENT, connector, described_fmu, package, ramp_fmu, real, ssd, ssm, ssv, sum_fmu, wire
 
 from cosim import Scenario
 from cosim.cli import main
@@ -48,6 +48,12 @@ LAPSES: dict[str, tuple[str, str, str]] = {
         'endConnector="all"',
         'endElement="" endConnector="all"',
         'endElement="" names no element',
+    ),
+    "parameters without a variable": (
+        connector("w", "input", "m/s"),
+        connector("w", "input", "m/s") + "".join(connector(f"medium.p{i}", "parameter") for i in range(22)),
+        "22 connectors of kind 'parameter' of component 'sum' (resources/sum.fmu) have no variable and no connection, "
+        "and are left out: medium.p0, medium.p1, medium.p2, medium.p3, medium.p4, medium.p5 and 16 more.",
     ),
     "undeclared prefix": (
         EXPERIMENT,
@@ -92,6 +98,35 @@ def test_a_lapse_is_reported_and_changes_no_number(
     printed = capsys.readouterr()
     assert words in printed.err
     assert not printed.out
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (wire("ramp.speed", "sum.u"), wire("ramp.speed", "sum.lost")),
+        (connector("lost", "parameter"), connector("lost", "input")),
+        (connector("lost", "parameter"), connector("lost", "output")),
+    ],
+    ids=["connected", "input", "output"],
+)
+def test_what_carries_a_signal_needs_a_variable(old: str, new: str, packed: Callable[[str], Path]) -> None:
+    carried = GOOD.replace(connector("w", "input", "m/s"), connector("w", "input") + connector("lost", "parameter"))
+    with pytest.raises(ScenarioError, match="has no variable 'lost'"):
+        Scenario.load(packed(carried.replace(old, new)))
+
+
+def test_a_parameter_that_no_mapping_takes_is_reported(tmp_path: Path) -> None:
+    files = {"resources/ramp.fmu": ramp_fmu(tmp_path), "resources/sum.fmu": sum_fmu(tmp_path)}
+    entry = '<ssm:MappingEntry source="other" target="x0[2]"/>'
+    binding = """<ssd:ParameterBindings><ssd:ParameterBinding source="a.ssv">
+    <ssd:ParameterMapping source="a.ssm"/></ssd:ParameterBinding></ssd:ParameterBindings></ssd:Component>"""
+    files |= {"a.ssm": ssm(entry), "a.ssv": ssv(real("other", "3") + real("slope", "5") + real("more", "7"))}
+    text = GOOD.replace(RAMP, RAMP.replace("</ssd:Component>", binding))
+    scenario = Scenario.load(package(tmp_path / "mapped.ssp", {"SystemStructure.ssd": text, **files}))
+    reported: list[str] = []
+    outcome = scenario.run(warn=reported.append)
+    assert any("no entry of the parameter mapping takes slope, more, so they are not set" in w for w in reported)
+    assert outcome["ramp.speed"][-1] == pytest.approx(10.0 + 3.0 * outcome.time[-1])
 
 
 def test_a_lapse_at_many_places_is_one_line(packed: Callable[[str], Path]) -> None:
