@@ -75,7 +75,7 @@ static void contradicts(Slave *slave, int64_t which, bool wrong, double t) {
 
 /* Count what the last step, from `t` to `until` [s], said that it must not; what is left to Python is counted there. */
 static void note_contradictions(const Program *program, Slave *slave, double t, double until) {
-    contradicts(slave, BEYOND_STEP, !program->early && program->reached > until + TIME_TOLERANCE, t);
+    contradicts(slave, BEYOND_STEP, !program->early && program->reached > until + TIME_TOLERANCE && isfinite(program->reached), t);
     contradicts(slave, EARLY_RETURN, program->early && !slave->returns_early, t);
     contradicts(slave, EVENT_WITHOUT_MODE, program->event && !slave->heeds_events, t);
 }

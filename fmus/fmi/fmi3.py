@@ -117,8 +117,9 @@ class FMI3Slave(FMI3Instance, Slave):
         finally:
             self.seconds += perf_counter() - begin
             self.calls += 1
-        if event or early or reached > until + TIME_TOLERANCE:
-            self._note_contradictions(t, bool(event), bool(early), reached > until + TIME_TOLERANCE)
+        beyond = until + TIME_TOLERANCE < reached < NEVER  # which stands in where the compiled stepper did the step
+        if event or early or beyond:
+            self._note_contradictions(t, bool(event), bool(early), beyond)
         if terminate:
             self.terminated = True
             # a slave that stops on the way says where

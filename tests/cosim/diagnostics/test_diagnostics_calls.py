@@ -86,7 +86,8 @@ def test_a_native_run_is_logged_call_by_call(version: Any, tmp_path: Path) -> No
         ("second", f"Get{real}"),
     ]
     assert [(c["who"], c["what"].removeprefix(f"fmi{version}")) for c in calls[begin:end]] == 3 * one_step
-    for back in (calls[begin - 1], calls[end]):  # what was set is read back before the first step and after the last
+    # what was set is read back as initialisation ends, before anything is set again, and after the last step
+    for back in (calls[begin - 2], calls[end]):
         assert (back["who"], back["arguments"], back["out"]) == ("first", "u", "2")
     for k in range(3):
         step, read, write, _, _ = calls[begin + 5 * k : begin + 5 * (k + 1)]
