@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
-from cosim.fmu_model.opening import Interface, open_model
+from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import SealedModel
 from cosim.process.exit_guard import limited_calls
 from cosim.process.last_call import LAST_CALL, READ, STEP, WRITE
 from cosim.runs.job import Job
 from cosim.runs.keys import digest, version_text
 from cosim.scenario.origin import ForeignFile
+from fmus.fmi.standard import Interface
 from fmus.fmi.types import is_continuous, why_not_set
 from fmus.fmi.units import NamedUnit, Units
 from plant_models.disk_cache.files import file_digest

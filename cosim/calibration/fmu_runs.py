@@ -11,9 +11,9 @@ import numpy as np
 from cosim.calibration.fmu_run import FmuRun, ReadSignals, SealedFmu
 from cosim.calibration.job_runs import JobRuns
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
-from cosim.fmu_model.opening import Interface
 from cosim.runs.executors import make_executor
 from cosim.runs.journal import Journal
+from fmus.fmi.standard import Interface
 from fmus.fmi.units import NamedUnit
 
 CALL_TIMEOUT = 60.0

@@ -10,8 +10,9 @@ from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 
 from cosim.components.unpacking import read_archive
 from cosim.errors import FmuLoadError
+from fmus.exchange.description import stepped_by
 from fmus.fmi.archive import Archive, NotAnFmuError
-from fmus.fmi.standard import CO_SIMULATION
+from fmus.fmi.standard import INTERFACES, Interface
 
 
 def read_description(path: str | Path, name: str = "FMU") -> ModelDescription:
@@ -48,8 +49,29 @@ def description_of_outputs(
     )
 
 
+def demand_steppable(description: ModelDescription, where: str, interface: Interface | None = None) -> str:
+    """Which interface type of an FMU is stepped, in the words of fmpy.
+
+    Args:
+        description: as read from the FMU. where: component and file, for messages.
+        interface: that is asked for; None for co-simulation, and model exchange where there is nothing else.
+
+    Raises:
+        FmuLoadError: it does not offer it, or nothing that can be stepped.
+    """
+    kind = stepped_by(description, interface)
+    if kind is None:
+        offered = [words for name, words in INTERFACES.items() if getattr(description, name) is not None]
+        wanted = interface or "co-simulation or model exchange"
+        raise FmuLoadError(
+            f"{where} offers {' and '.join(offered) or 'no interface'} only; {wanted} is asked for. Ask its maker for "
+            "an export for co-simulation (most tools offer both)."
+        )
+    return kind
+
+
 def runs_here(path: Path) -> str:
-    """``yes``, or why the co-simulation of an FMU file cannot run on this machine.
+    """``yes``, or why an FMU file cannot run on this machine.
 
     Args:
         path: the ``.fmu`` file.
@@ -58,9 +80,10 @@ def runs_here(path: Path) -> str:
         FmuLoadError: as for `read_description`.
     """
     archive = open_fmu(path, path.name)
-    if archive.description.coSimulation is None:
-        return "no, it offers no co-simulation"
-    reason = archive.why_not_here(CO_SIMULATION)
+    kind = stepped_by(archive.description)
+    if kind is None:
+        return "no, it offers neither co-simulation nor model exchange"
+    reason = archive.why_not_here(kind)
     return f"no, it {reason}" if reason else "yes"
 
 

@@ -18,7 +18,7 @@ import fmpy
 from fmpy.model_description import ModelDescription
 
 from cosim.components.component import Component
-from cosim.components.description import open_fmu, read_description
+from cosim.components.description import demand_steppable, open_fmu, read_description
 from cosim.components.fmi3 import FMI3Component
 from cosim.components.stated_units import NONE_STATED, StatedUnit, state_units
 from cosim.components.unpacking import unpack
@@ -26,13 +26,15 @@ from cosim.errors import CouplingError, FmuLoadError, ScenarioError
 from cosim.process.exit_guard import guard_exit
 from cosim.process.last_call import LAST_CALL
 from fmu_observer.description import describe
+from fmus.exchange.description import as_stepped
+from fmus.exchange.slave import TOLERANCE, as_slave
 from fmus.fmi.archive import Archive, NotAnFmuError
 from fmus.fmi.binaries import platform_folder
 from fmus.fmi.description import negated_aliases
 from fmus.fmi.fmi1 import FMI1Slave
 from fmus.fmi.fmi2 import FMI2Slave
 from fmus.fmi.library import load
-from fmus.fmi.standard import CO_SIMULATION, fmi_version
+from fmus.fmi.standard import CO_SIMULATION, Interface, Method, fmi_version
 from fmus.fmi.surroundings import Surroundings
 from plant_models.hybrid import HybridSystem, TracingError
 
@@ -201,7 +203,12 @@ COMPONENTS: dict[int, Any] = {1: FMI1Component, 2: FMI2Component, 3: FMI3Compone
 
 
 def load_fmu(
-    path: str | Path, name: str, tolerance: float | str | None = None, units: Mapping[str, StatedUnit] = NONE_STATED
+    path: str | Path,
+    name: str,
+    tolerance: float | str | None = None,
+    units: Mapping[str, StatedUnit] = NONE_STATED,
+    interface: Interface | None = None,
+    method: Method = "bdf",
 ) -> Component:
     """Unpack an FMU and prepare an instance of it.
 
@@ -210,34 +217,33 @@ def load_fmu(
         name: name of the component.
         tolerance: relative, for its solver, or ``none``; where not given the declared one.
         units: what the scenario states of its variables, by name.
+        interface: which one is stepped; None for co-simulation, and model exchange where there is nothing else.
+        method: of the solver that moves a model exchange FMU.
 
     Raises:
-        FmuLoadError: the file is missing or broken, has no co-simulation, or no library for this platform.
+        FmuLoadError: the file is missing or broken, has no such interface, or no library for this platform.
         CouplingError: the stated units do not fit it.
     """
     path = Path(path)
     archive = open_fmu(path, name)
-    description = archive.description
-    state_units(description, units, name)
-    if description.coSimulation is None:
-        raise FmuLoadError(
-            f"{name}: {path} offers no co-simulation interface; this master steps co-simulation FMUs only."
-        )
+    kind = demand_steppable(archive.description, f"{name}: {path}", interface)
+    state_units(archive.description, units, name)
+    description = as_stepped(archive.description, interface)
     try:
-        archive.demand_this_platform(CO_SIMULATION)
+        archive.demand_this_platform(kind)
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
     guard_exit()
     here, before = Path.cwd(), Surroundings()
     try:
-        folder, slave = _unpacked_and_loaded(archive, path, name)
+        folder, slave = _unpacked_and_loaded(archive, path, name, kind)
     finally:
         os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
         changed = before.put_back()
     more = {"negated": negated_aliases(folder)} if fmi_version(description) == 1 else {}
     component: Component = COMPONENTS[fmi_version(description)](
         name,
-        slave,
+        slave if kind == CO_SIMULATION else as_slave(slave, description, method),
         description,
         source=str(path),
         kind="FMU",
@@ -246,11 +252,16 @@ def load_fmu(
     )
     component.trespasses |= dict.fromkeys(changed, "loading its library")
     component.choose_tolerance(tolerance)
+    if kind != CO_SIMULATION:  # the solver is here, for FMI 1 too, and needs one
+        component.tolerance = component.tolerance or (tolerance if isinstance(tolerance, float) else TOLERANCE)
     return component
 
 
-def _unpacked_and_loaded(archive: Archive, path: Path, name: str) -> tuple[Path, Any]:
+def _unpacked_and_loaded(archive: Archive, path: Path, name: str, kind: str) -> tuple[Path, Any]:
     """The folder into which an FMU is unpacked, and fmpy's slave with its library loaded; no folder is left on failure.
+
+    Args:
+        kind: interface type that is stepped.
 
     Raises:
         FmuLoadError: there is no such library, or it cannot be loaded.
@@ -258,9 +269,9 @@ def _unpacked_and_loaded(archive: Archive, path: Path, name: str) -> tuple[Path,
     folder: Path | None = None
     try:
         folder = unpack(archive)
-        _refuse_foreign_libraries(_library(folder, archive.description), path, name)
+        _refuse_foreign_libraries(_library(folder, archive.description, kind), path, name)
         with LAST_CALL.making(name, "loading its library"):
-            return folder, load(folder, archive.description, CO_SIMULATION, name, complete=True)
+            return folder, load(folder, archive.description, kind, name, complete=True)
     except Exception as error:
         if folder is not None:
             shutil.rmtree(folder, ignore_errors=True)
@@ -271,18 +282,24 @@ def _unpacked_and_loaded(archive: Archive, path: Path, name: str) -> tuple[Path,
         raise FmuLoadError(f"{name}: cannot load {path}: {lacks}{error}") from error
 
 
-def describe_fmu(path: str | Path, name: str, units: Mapping[str, StatedUnit] = NONE_STATED) -> Component:
+def describe_fmu(
+    path: str | Path,
+    name: str,
+    units: Mapping[str, StatedUnit] = NONE_STATED,
+    interface: Interface | None = None,
+) -> Component:
     """A component of an FMU file that can be asked for its variables and not stepped: nothing is unpacked or loaded.
 
     Args:
         path: the ``.fmu`` file.
         name: of the component.
         units: what the scenario states of its variables, by name.
+        interface: as for `load_fmu`.
 
     Raises:
         FmuLoadError: as for `read_description`. CouplingError: the stated units do not fit it.
     """
-    description = read_description(path, name)
+    description = as_stepped(read_description(path, name), interface)
     state_units(description, units, name)
     more = {"negated": negated_aliases(Path(path))} if fmi_version(description) == 1 else {}
     component: Component = COMPONENTS[fmi_version(description)](name, None, description, source=str(path), **more)
@@ -344,6 +361,6 @@ def _traced(name: str) -> Iterator[None]:
         raise ScenarioError(f"Component {name!r}: {error}{way_out}") from error
 
 
-def _library(folder: Path, description: ModelDescription) -> Path:
-    name = f"{description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
+def _library(folder: Path, description: ModelDescription, kind: str) -> Path:
+    name = f"{getattr(description, kind).modelIdentifier}{fmpy.sharedLibraryExtension}"
     return folder / "binaries" / platform_folder(description) / name

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from cosim.toml_table import OwnSeed, TomlTable
+from fmus.fmi.standard import Interface
 from plant_models.hybrid.noise import FROM_NAME
 
 Kind = Literal["ekf", "ukf", "ensemble", "particle"]
@@ -22,9 +23,7 @@ class FilterTable(TomlTable):
     """
 
     kind: Kind = Field(description="`ekf`, `ukf`, `ensemble` or `particle`")
-    interface: Literal["co-simulation", "model-exchange"] | None = Field(
-        default=None, description="of an FMU that has both; co-simulation by default"
-    )
+    interface: Interface | None = Field(default=None, description="of an FMU that has both; co-simulation by default")
     states: list[str] | None = Field(default=None, description="states; those that the FMU declares by default")
     outputs: list[str] | None = Field(default=None, description="outputs that are estimated; all by default")
     measurements: dict[str, _Positive] = Field(

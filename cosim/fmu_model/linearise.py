@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from cosim.errors import nearest
 from cosim.fmu_model.exchange import ExchangeModel
 from cosim.fmu_model.linearisation import Linearisation, Method
-from cosim.fmu_model.opening import Interface, open_model
+from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_states
 from fmus.check.findings import Verdict
 from fmus.check.finite_differences import RELATIVE_STEP, compare
+from fmus.fmi.standard import Interface
 
 Array = NDArray[np.float64]
 _HELD_TYPES = ("Real", "Float64", "Float32")

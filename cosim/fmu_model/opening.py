@@ -6,7 +6,7 @@ import os
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from fmpy.model_description import ModelDescription
 
@@ -20,10 +20,7 @@ from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from fmus.check.checked_instance import SlaveError, make_slave
 from fmus.check.exchange_model import make_model
 from fmus.fmi.archive import NotAnFmuError
-from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, fmi_version
-
-Interface = Literal["co-simulation", "model-exchange"]
-INTERFACES: dict[Interface, str] = {"co-simulation": CO_SIMULATION, "model-exchange": MODEL_EXCHANGE}
+from fmus.fmi.standard import CO_SIMULATION, STEPPED, Interface, fmi_version
 
 
 def open_model(
@@ -85,8 +82,8 @@ def _interface_of(description: ModelDescription, path: Path, interface: Interfac
     """
     if fmi_version(description) == 1:
         raise FmuModelError(f"{path}: FMI 1.0 has no way to reset or to set states. Export it as FMI 2.0 or 3.0.")
-    offered = [kind for kind in INTERFACES.values() if getattr(description, kind) is not None]
-    chosen = INTERFACES[interface] if interface is not None else next(iter(offered), CO_SIMULATION)
+    offered = [kind for kind in STEPPED.values() if getattr(description, kind) is not None]
+    chosen = STEPPED[interface] if interface is not None else next(iter(offered), CO_SIMULATION)
     if chosen not in offered:
         instead = ", ".join(offered) or "scheduled execution only, in which no time passes by itself"
         raise FmuModelError(f"{path}: it has no {interface or 'co-simulation'}; it offers: {instead}.")

@@ -151,7 +151,8 @@ def _of_file(
     if table.fmu is None:
         return partial(python_component, name, table, where)
     chosen = tolerance if table.tolerance is None else table.tolerance
-    return partial(load_fmu, (folder / table.fmu).resolve(), name, chosen, table.units)
+    path = (folder / table.fmu).resolve()
+    return partial(load_fmu, path, name, chosen, table.units, table.interface, table.method)
 
 
 def _declared(factory: Callable[[], Component], missing: Sequence[str], where: str) -> Component:

@@ -26,7 +26,9 @@ def coupling_warnings(
     """
     doubts = []
     deaf = [
-        name for name, of in table.components.items() if of.tolerance is not None and components[name].fmi_version == 1
+        name
+        for name, of in table.components.items()
+        if of.tolerance is not None and components[name].fmi_version == 1 and components[name].tolerance is None
     ]
     if deaf:
         doubts.append(

@@ -35,7 +35,7 @@ def describe_component(
     elif system is None and table.fmu is None:
         component = python_component(name, table, where)
     elif system is None:
-        component = describe_fmu((folder / str(table.fmu)).resolve(), name, table.units)
+        component = describe_fmu((folder / str(table.fmu)).resolve(), name, table.units, table.interface)
     else:
         backend = intended(table, system)
         version: Any = int(backend[-1])

@@ -24,6 +24,7 @@ from cosim.run.run_seeds import component_seed
 from cosim.run.task import RunTask
 from cosim.scenario.scenario_tables import ComponentTable
 from cosim.scenario.schema import ScenarioTable
+from fmus.exchange.description import as_stepped
 from fmus.fmi.capabilities import read_capabilities, tool_warning
 from fmus.fmi.sense import doubled_names
 
@@ -58,9 +59,9 @@ def _check_instances(files: Mapping[str, Path], where: str) -> None:
         if path not in descriptions:
             descriptions[path] = read_description(path, name)
         description = descriptions[path]
-        if not read_capabilities(description).canBeInstantiatedOnlyOncePerProcess:
+        if not read_capabilities(as_stepped(description)).canBeInstantiatedOnlyOncePerProcess:
             continue
-        identity = (description.coSimulation.modelIdentifier, str(description.guid))
+        identity = (as_stepped(description).coSimulation.modelIdentifier, str(description.guid))
         if identity in first:
             raise CouplingError(
                 f"{where}: components {first[identity]!r} and {name!r} are the same FMU ({path.name}), which can be "

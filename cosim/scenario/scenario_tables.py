@@ -15,6 +15,7 @@ from cosim.results.formats.known_formats import FORMATS
 from cosim.scenario.model_name import Model
 from cosim.toml_table import Name, OwnSeed, TomlTable
 from fmu_observer.event_protocol import LatePolicy
+from fmus.fmi.standard import Interface, Method
 from plant_models.hybrid.noise import FROM_NAME, OWN_SEED_EXPECTED
 from plant_models.meant_number import meant_number
 
@@ -84,6 +85,10 @@ def _starts(stated: Any) -> Any:
     return {**stated, "seed": _Seed(seed)} if isinstance(seed, float) and not math.isfinite(seed) else stated
 
 
+_SOLVING = frozenset({"interface", "solver", "method"})
+"""Keys of an FMU that say how it is stepped."""
+
+
 class ComponentTable(TomlTable):
     """One component: an FMU by path, or a shipped plant, sensor, driver or observer by name."""
 
@@ -99,6 +104,9 @@ class ComponentTable(TomlTable):
     parameters: Annotated[dict[str, Start], BeforeValidator(_starts)] = {}
     units: dict[str, Stated] = {}
     tolerance: Tolerance | None = None
+    interface: Interface | None = None
+    solver: Literal["cvode"] = "cvode"
+    method: Method = "bdf"
     late_policy: LatePolicy = "replay"
     replay_horizon: Annotated[float, Field(gt=0.0)] = 10.0
     record: list[str] = []
@@ -125,6 +133,8 @@ class ComponentTable(TomlTable):
             raise ValueError("'units' belong to an FMU, whose description may lack them")
         if stated != ["fmu"] and self.tolerance is not None:
             raise ValueError("'tolerance' belongs to an FMU; shipped models have the parameter 'internal_step' instead")
+        if (solving := _SOLVING & self.model_fields_set) and stated != ["fmu"]:
+            raise ValueError(f"{sorted(solving)[0]!r} belongs to an FMU, which a solver moves in model exchange")
         if stated != ["recording"] and {"component", "interpolation"} & self.model_fields_set:
             raise ValueError("'component' and 'interpolation' belong to a recording")
         if stated == ["recording"] and (self.preset or self.options or self.backend or self.parameters):

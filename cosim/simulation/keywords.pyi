@@ -49,6 +49,9 @@ class ComponentKeywords(TypedDict, total=False):
     parameters: Mapping[str, Any]
     units: Mapping[str, Any]
     tolerance: float | Literal["none"] | None
+    interface: Literal["co-simulation", "model-exchange"] | None
+    solver: Literal["cvode"]
+    method: Literal["bdf", "adams"]
     late_policy: Literal["replay", "reject", "late"]
     replay_horizon: float
     record: Sequence[str]

@@ -12,10 +12,9 @@ from typing import Any
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.components.component import Component
-from cosim.components.description import read_description, runs_here
+from cosim.components.description import demand_steppable, read_description, runs_here
 from cosim.components.loading import describe_fmu
 from cosim.components.stated_units import NONE_STATED, StatedUnit
-from cosim.errors import FmuLoadError
 from cosim.starter.guessed_signal import GuessedSignal
 from fmus.fmi.elements import elements_of
 from fmus.fmi.types import NUMERIC_TYPES
@@ -62,7 +61,7 @@ def inspect_fmu(path: Path, units: Mapping[str, StatedUnit] = NONE_STATED) -> In
     Raises:
         FmuLoadError: it is missing, broken, or not made for co-simulation. CouplingError: `units` do not fit it.
     """
-    _demand_co_simulation(path, read_description(path, path.name))
+    demand_steppable(read_description(path, path.name), str(path))
     component = describe_fmu(path, NAME, units)
     found: dict[str, list[GuessedSignal]] = {"input": [], "output": [], "parameter": [], "local": []}
     unread: list[str] = []
@@ -76,17 +75,6 @@ def inspect_fmu(path: Path, units: Mapping[str, StatedUnit] = NONE_STATED) -> In
             unread.append(_unread(variable))
     return InspectedFmu(
         path, component, found["input"], found["output"], found["parameter"], found["local"], unread, runs_here(path)
-    )
-
-
-def _demand_co_simulation(path: Path, description: ModelDescription) -> None:
-    if description.coSimulation is not None:
-        return
-    kinds = {"modelExchange": "model exchange", "scheduledExecution": "scheduled execution"}
-    offered = " and ".join(text for key, text in kinds.items() if getattr(description, key, None) is not None)
-    raise FmuLoadError(
-        f"{path} offers {offered or 'no interface'} only; this master steps co-simulation FMUs. Ask its maker for an "
-        "export for co-simulation (most tools offer both)."
     )
 
 

@@ -81,10 +81,15 @@ class FMI1Slave(WholeStepSlave):
     def exit_initialization(self) -> None:
         """Initialise the slave with the inputs and start values set so far."""
         call, start, stop = self.slave.initialize, self.time, self._stop_time
-        self.guard("fmiInitializeSlave", lambda: call(tStart=start, stopTime=stop))
+        tolerance, _ = self.tolerance_argument()  # of a solver here, never of co-simulation
+        self.guard("fmiInitializeSlave", lambda: call(tStart=start, stopTime=stop, **tolerance))
         self._initialized = self._running = True
 
     def _after_discard(self, error: FMICallException, t: float, until: float) -> None:
+        solved = getattr(self.slave, "functions", None)  # model exchange knows of an end, co-simulation of FMI 1 not
+        if solved is not None and solved.has_terminated():
+            self.time, self.terminated = solved.reached, True
+            return
         raise self._not_done(error, t, until, status_of(self.slave.getRealStatus, fmi1LastSuccessfulTime)) from error
 
     def notify(self, event: EventPort, t: float, stamp: float, payload: Mapping[str, float]) -> None:

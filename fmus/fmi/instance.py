@@ -336,7 +336,8 @@ class Instance(Described):
         """
         if isinstance(error, FMICallException) and getattr(error, "status", None) == FATAL:
             self._alive = self._running = False
-        return self.failure(f"{what} failed: {error or type(error).__name__}", t)
+        stated = getattr(self.slave, "reason", "")  # of one that is stepped by a solver here, which says more
+        return self.failure(f"{what} failed: {stated or error or type(error).__name__}", t)
 
     def discarded(self, error: Exception, asked: str, t: float) -> Exception:
         """The error of a discarded step: in the slave's own words, and with advice only where it said nothing.

@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from fmpy.fmi1 import FMU1Model
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
 from fmpy.model_description import ModelDescription
@@ -22,6 +23,7 @@ from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION
 
 FACES: dict[tuple[int, str], type] = {
     (1, CO_SIMULATION): FMU1SlaveRepaired,
+    (1, MODEL_EXCHANGE): FMU1Model,
     (2, CO_SIMULATION): FMU2Slave,
     (2, MODEL_EXCHANGE): FMU2Model,
     (3, CO_SIMULATION): FMU3Slave,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from fmpy.model_description import ModelDescription
@@ -16,6 +16,14 @@ INTERFACES = {
     SCHEDULED_EXECUTION: "scheduled execution",
 }
 """Interface types as fmpy calls them, and in words."""
+
+Interface = Literal["co-simulation", "model-exchange"]
+"""Those that can be stepped, in the words of a user."""
+
+STEPPED: dict[Interface, str] = {"co-simulation": CO_SIMULATION, "model-exchange": MODEL_EXCHANGE}
+
+Method = Literal["bdf", "adams"]
+"""Multistep formulas of a solver: for stiff equations, and for others."""
 
 STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
 """Names of the FMI statuses, by number."""

@@ -83,10 +83,14 @@ def test_what_is_no_archive(tmp_path: Path) -> None:
         ({"readme.txt": "no description"}, "is not a readable FMU"),
         ({"modelDescription.xml": "<fmiModelDescription"}, "is not a readable FMU"),
         (
-            {"modelDescription.xml": xml(interface='<ModelExchange modelIdentifier="toy"/>')},
-            "offers no co-simulation interface",
+            {"modelDescription.xml": xml(interface='<ScheduledExecution modelIdentifier="toy"/>')},
+            "offers scheduled execution only; co-simulation or model exchange is asked for",
         ),
-        ({"modelDescription.xml": xml("1.0")}, "offers no co-simulation interface"),
+        (
+            {"modelDescription.xml": xml(interface='<ModelExchange modelIdentifier="toy"/>')},
+            "no library for this platform",
+        ),
+        ({"modelDescription.xml": xml("1.0")}, f"no library .*{fmpy.platform} is needed"),
         ({"modelDescription.xml": xml("1.0", "<Implementation/>")}, f"no library .*{fmpy.platform} is needed"),
         (
             {"modelDescription.xml": xml("1.0", "<Implementation/>"), library("1.0"): b"x"},

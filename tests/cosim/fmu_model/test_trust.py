@@ -19,9 +19,10 @@ import fmus
 from cosim.fmu_model import exchange
 from cosim.fmu_model.co_simulation import CoSimulationModel
 from cosim.fmu_model.linearise import _linearise_model, _objections
-from cosim.fmu_model.opening import Interface, open_model
+from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_saving, check_states
+from fmus.fmi.standard import Interface
 from plant_models import PLANTS
 
 

@@ -321,8 +321,8 @@ def test_what_is_no_fmu_or_not_for_co_simulation_is_refused(tmp_path: Path) -> N
         starter(tmp_path / "text.fmu", tmp_path / "mine.toml")
     with pytest.raises(FmuLoadError, match=r"nowhere\.fmu"):
         starter(tmp_path / "nowhere.fmu", tmp_path / "mine.toml")
-    fmu = described(tmp_path, out("y", 1), edit=("<CoSimulation", "<ModelExchange"))
-    with pytest.raises(FmuLoadError, match=r"offers model exchange only; .*Ask its maker"):
+    fmu = described(tmp_path, out("y", 1), version=3, edit=("<CoSimulation", "<ScheduledExecution"))
+    with pytest.raises(FmuLoadError, match=r"offers scheduled execution only; .*Ask its maker"):
         write_starter(fmu, tmp_path / "mine.toml")
     assert not (tmp_path / "mine.toml").exists()
 

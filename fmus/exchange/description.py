@@ -1,0 +1,55 @@
+"""What a model exchange FMU says it can do once a solver steps it: the description with an element of co-simulation."""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import Any
+
+from fmpy.model_description import CoSimulation, ModelDescription
+
+from fmus.fmi.standard import MODEL_EXCHANGE, STEPPED, Interface, fmi_version
+
+
+def stepped_by(description: ModelDescription, interface: Interface | None = None) -> str | None:
+    """Which interface type of an FMU is stepped, in the words of fmpy; None where it does not offer it.
+
+    Args:
+        description: as read from the FMU.
+        interface: that is asked for; None for co-simulation, and model exchange where there is nothing else.
+    """
+    offered = [kind for kind in STEPPED.values() if getattr(description, kind) is not None]
+    chosen = offered[:1] if interface is None else [kind for kind in offered if kind == STEPPED[interface]]
+    return chosen[0] if chosen else None
+
+
+def as_stepped(description: ModelDescription, interface: Interface | None = None) -> ModelDescription:
+    """The description of an FMU as a slave: that of one whose model exchange is stepped says what it can do then.
+
+    Args:
+        description: as read from the FMU. interface: as for `stepped_by`.
+    """
+    if stepped_by(description, interface) != MODEL_EXCHANGE:
+        return description
+    own, version = description.modelExchange, fmi_version(description)
+    shared: dict[str, Any] = {
+        name: getattr(own, name, False)
+        for name in (
+            "needsExecutionTool",
+            "canBeInstantiatedOnlyOncePerProcess",
+            "canGetAndSetFMUstate",
+            "providesDirectionalDerivative",
+            "providesAdjointDerivatives",
+            "canNotUseMemoryManagementFunctions",
+            "providesPerElementDependencies",
+        )
+    }
+    stepped = copy(description)
+    in_events = version == 3
+    stepped.coSimulation = CoSimulation(
+        modelIdentifier=own.modelIdentifier,
+        canHandleVariableCommunicationStepSize=True,
+        hasEventMode=in_events,
+        mightReturnEarlyFromDoStep=in_events,
+        **shared,
+    )
+    return stepped

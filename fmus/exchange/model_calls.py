@@ -1,0 +1,204 @@
+"""The calls of model exchange, alike for FMI 1, 2 and 3: time, states, derivatives, indicators, events."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from fmpy.fmi1 import FMICallException, fmi1EventInfo
+from fmpy.fmi2 import fmi2EventInfo
+
+from fmus.fmi.native_calls import WARNING
+from fmus.fmi.standard import DISCARD, NEVER
+
+_NAMES = {
+    "rates": ("GetDerivatives", "GetDerivatives", "GetContinuousStateDerivatives"),
+    "nominals": ("GetNominalContinuousStates", "GetNominalsOfContinuousStates", "GetNominalsOfContinuousStates"),
+}
+"""Functions whose name depends on the version of FMI, by version."""
+
+
+@dataclass(frozen=True)
+class EventIteration:
+    """What an FMU says at the end of one event iteration.
+
+    Args:
+        again: another one is needed. terminate: it asks for the end. next_event: that it knows of [s].
+    """
+
+    again: bool
+    terminate: bool
+    next_event: float
+
+
+class ModelCalls:
+    """Calls of one instance. Arrays are ctypes arrays of doubles; a status above a warning raises `FMICallException`.
+
+    Args:
+        slave: fmpy's model, instantiated or not. version: of FMI. counts: of states, and of event indicators.
+        functions: of the library by name, as it exports them.
+        complete_steps: whether it wants to know of each step that the solver completed.
+    """
+
+    def __init__(
+        self,
+        slave: Any,
+        version: int,
+        counts: tuple[int, int],
+        functions: dict[str, Any],
+        *,
+        complete_steps: bool,
+    ) -> None:
+        self._slave, self._version, self._functions = slave, version, functions
+        self.state_count, self.indicator_count = counts
+        self._complete_steps = complete_steps
+        self.failed: FMICallException | None = None  # with which the FMU last refused what a solver asked
+        self._set_time, self._set_states = self._made("SetTime"), self._made("SetContinuousStates")
+        self._get_rates, self._get_indicators = self._made(self._name("rates")), self._made("GetEventIndicators")
+        self._get_states, self._get_nominals = self._made("GetContinuousStates"), self._made(self._name("nominals"))
+
+    def move(self, t: float, x: Any) -> None:
+        """Set time [s] and states."""
+        self._done(self._set_time, t)
+        if self.state_count:
+            self._done(self._set_states, x, self.state_count)
+
+    def set_time(self, t: float) -> None:
+        """Set the independent variable [s] alone."""
+        self._done(self._set_time, t)
+
+    def rates(self, t: float, x: Any, written: Any) -> int:
+        """Derivatives, for a solver: see `cvode.Rates`.
+
+        Args:
+            t: instant [s]. x: states. written: where to.
+        """
+        if not self.state_count:  # a state that stands, so that the solver has one
+            written[0] = 0.0
+            return 0
+        return self._tried(t, x, self._get_rates, written, self.state_count)
+
+    def indicators(self, t: float, x: Any, written: Any) -> int:
+        """Event indicators likewise.
+
+        Args:
+            t: instant [s]. x: states. written: where to.
+        """
+        return self._tried(t, x, self._get_indicators, written, self.indicator_count)
+
+    def states(self, written: Any) -> None:
+        """Read the continuous states.
+
+        Args:
+            written: where to.
+        """
+        if self.state_count:
+            self._done(self._get_states, written, self.state_count)
+
+    def nominals(self) -> np.ndarray:
+        """Magnitudes of the states, shape (n,), at least one; 1 where the FMU says nothing that is one."""
+        found = np.ones(max(self.state_count, 1))
+        if self.state_count:
+            array = (ctypes.c_double * self.state_count).from_buffer(found)
+            self._done(self._get_nominals, array, self.state_count)
+        return np.where(np.isfinite(found) & (found != 0.0), np.abs(found), 1.0)
+
+    def enter_event_mode(self) -> None:
+        """To Event Mode, which FMI 1 does not know."""
+        if self._version > 1:
+            self.call("EnterEventMode")
+
+    def enter_continuous_mode(self) -> None:
+        """To Continuous-Time Mode, which FMI 1 does not know."""
+        if self._version > 1:
+            self.call("EnterContinuousTimeMode")
+
+    def update(self) -> EventIteration:
+        """One event iteration, in Event Mode."""
+        if self._version == 1:
+            info = fmi1EventInfo()
+            self.call("EventUpdate", b"\x00", ctypes.byref(info))
+            return first_update(info)
+        if self._version == 2:
+            said = fmi2EventInfo()
+            self.call("NewDiscreteStates", ctypes.byref(said))
+            due = said.nextEventTime if said.nextEventTimeDefined else NEVER
+            return EventIteration(bool(said.newDiscreteStatesNeeded), bool(said.terminateSimulation), due)
+        flags = tuple(ctypes.c_bool() for _ in range(5))
+        due = ctypes.c_double()
+        self.call("UpdateDiscreteStates", *map(ctypes.byref, flags), ctypes.byref(due))
+        return EventIteration(flags[0].value, flags[1].value, due.value if flags[4].value else NEVER)
+
+    def completed(self) -> tuple[bool, bool]:
+        """The solver completed a step that ends here: whether the FMU wants Event Mode, and the end."""
+        if not self._complete_steps:
+            return False, False
+        if self._version == 1:
+            wanted = ctypes.c_char()
+            self.call("CompletedIntegratorStep", ctypes.byref(wanted))
+            return wanted.value != b"\x00", False
+        kind: Any = ctypes.c_int if self._version == 2 else ctypes.c_bool
+        enter, end = kind(), kind()
+        self.call("CompletedIntegratorStep", kind(0), ctypes.byref(enter), ctypes.byref(end))
+        return bool(enter.value), bool(end.value)
+
+    def call(self, name: str, *arguments: Any) -> None:
+        """Call a function with the instance and arguments.
+
+        Args:
+            name: without the prefix of FMI. arguments: of it.
+        """
+        self._done(self._made(name), *arguments)
+
+    # -- internals --------------------------------------------------------------------------------------------------
+
+    def _name(self, what: str) -> str:
+        return _NAMES[what][self._version - 1]
+
+    def _made(self, name: str) -> Callable[..., int]:
+        """A function of the library with the instance as its first argument; it returns the status."""
+        whole = f"fmi{self._version}{name}"
+        slave, function = self._slave, self._functions[whole]
+
+        def call(*arguments: Any) -> int:
+            status = int(function(slave.component, *arguments))
+            if slave.fmiCallLogger is not None:
+                every = (slave.component, *arguments)
+                slave._log_fmi_args(whole, function.argnames, function.argtypes, every, ctypes.c_int, status)
+            if status == WARNING:
+                slave.warned(whole)
+            return status
+
+        call.whole = whole  # type: ignore[attr-defined]
+        return call
+
+    @staticmethod
+    def _done(call: Callable[..., int], *arguments: Any) -> None:
+        status = call(*arguments)
+        if status > WARNING:
+            raise FMICallException(call.whole, status)  # type: ignore[attr-defined]
+
+    def _tried(self, t: float, x: Any, get: Callable[..., int], written: Any, count: int) -> int:
+        """What a solver is to make of a call at an instant [s] and states."""
+        call, status = self._set_time, self._set_time(t)
+        if status <= WARNING and self.state_count:
+            call, status = self._set_states, self._set_states(x, self.state_count)
+        if status <= WARNING:
+            call, status = get, get(written, count)
+        if status <= WARNING:
+            return 0
+        self.failed = FMICallException(call.whole, status)  # type: ignore[attr-defined]
+        return 1 if status == DISCARD else -1
+
+
+def first_update(info: fmi1EventInfo) -> EventIteration:
+    """What FMI 1 says of an event.
+
+    Args:
+        info: as filled by the FMU.
+    """
+    due = info.nextEventTime if info.upcomingTimeEvent != b"\x00" else NEVER
+    return EventIteration(info.iterationConverged == b"\x00", info.terminateSimulation != b"\x00", due)

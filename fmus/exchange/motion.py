@@ -1,0 +1,191 @@
+"""The motion of a model exchange FMU: integrated from event to event, each found by the solver and handled by the FMU.
+
+State events lie where an event indicator changes its sign, time events where the FMU announced them, step events where
+it asks for one after a step of the solver. The solver goes on with what it knows as long as nothing jumps; it begins
+anew after an event, and after a state was saved or restored, so that what follows a restored state is identical.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from fmus.exchange.cvode import Cvode, SolverError
+from fmus.exchange.model_calls import EventIteration, ModelCalls
+from fmus.fmi.standard import ERROR, MAX_EVENT_ITERATIONS, MAX_RETURNS_PER_STEP, NEVER, TIME_TOLERANCE, Method
+
+MOST_AT_ONCE = 100
+"""Events each within a billionth of a second of the one before it: a model that has more does not settle."""
+
+MOST_STEPS = 1_000_000
+"""Internal steps of the solver in one communication step."""
+
+_ROUNDING = 4e-16
+Part = Callable[[float, float], None]
+"""Called when the solver has taken an internal step, with its begin and its end [s]."""
+
+
+class StepEnd(NamedTuple):
+    """Where a step ended.
+
+    Attributes:
+        time: reached [s]. event: an event lies there. terminate: the FMU asks for the end.
+    """
+
+    time: float
+    event: bool
+    terminate: bool
+
+
+class Motion:
+    """States of one instance in time. It stands in Event Mode (`in_event_mode`) or in Continuous-Time Mode.
+
+    Args:
+        model: its calls. tolerance: relative, of the solver. method: of the solver.
+        state_name: name of a state by its number, for messages.
+    """
+
+    def __init__(self, model: ModelCalls, tolerance: float, method: Method, state_name: Callable[[int], str]) -> None:
+        self._model, self._state_name = model, state_name
+        nominals = np.ones(max(model.state_count, 1))
+        self.solver = Cvode(
+            len(nominals), model.indicator_count, model.rates, model.indicators, tolerance, nominals, method
+        )
+        self._x = self.solver.address(self.solver.states)
+        self.in_event_mode, self.terminated, self.next_event = True, False, NEVER
+        self._anew = True
+        self._last_event, self._at_once = -NEVER, 0
+        self.follower: Part | None = None
+        """Called for each internal step; it may `look` at instants within it."""
+
+    # -- events -----------------------------------------------------------------------------------------------------
+
+    def enter_event_mode(self) -> None:
+        """From Continuous-Time Mode to Event Mode; nothing where it is there."""
+        if not self.in_event_mode:
+            self._model.enter_event_mode()
+            self.in_event_mode = True
+
+    def settle(self) -> None:
+        """In Event Mode: iterate until the discrete states do not change any more, and go on in Continuous-Time Mode.
+
+        Raises:
+            SolverError: they do not settle.
+        """
+        for _ in range(MAX_EVENT_ITERATIONS):
+            if not self.note(self._model.update()) or self.terminated:
+                self.leave_event_mode()
+                return
+        raise SolverError(f"discrete states do not settle in {MAX_EVENT_ITERATIONS} updates")
+
+    def note(self, update: EventIteration) -> bool:
+        """Keep what the FMU said at the end of an event iteration; True where it needs another one.
+
+        Args:
+            update: what it said.
+
+        Raises:
+            SolverError: it says that the next event is at no time.
+        """
+        if np.isnan(update.next_event):
+            raise SolverError("the FMU says that the next event is at t = nan")
+        self.next_event, self.terminated = update.next_event, self.terminated or update.terminate
+        return update.again
+
+    def leave_event_mode(self) -> None:
+        """From Event Mode, settled, to Continuous-Time Mode; the solver begins anew."""
+        if not self.terminated:
+            self._model.enter_continuous_mode()
+        self.in_event_mode = False
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """States jumped, or the FMU was set to others: the solver forgets the past."""
+        self._anew = True
+
+    # -- time -------------------------------------------------------------------------------------------------------
+
+    def advance(self, t: float, until: float) -> StepEnd:
+        """To the end of a communication step, events on the way handled.
+
+        Args:
+            t, until: begin and end [s].
+
+        Raises:
+            FMICallException: the FMU refuses. SolverError: the solver cannot go on, or events do not settle.
+        """
+        for _ in range(MAX_RETURNS_PER_STEP):
+            if self.in_event_mode:
+                self.settle()
+                if self.terminated:
+                    return StepEnd(t, event=False, terminate=True)
+            t, event, terminate = self.to_event(t, until)
+            if terminate or not event:
+                return StepEnd(t, event=False, terminate=terminate)
+            self.enter_event_mode()
+        raise SolverError(f"at t = {t:.12g} s: {MAX_RETURNS_PER_STEP} events in one communication step")
+
+    def to_event(self, t: float, until: float) -> StepEnd:
+        """To the first event, which is not handled, or the end of the step.
+
+        Args:
+            t, until: begin and end [s].
+        """
+        for _ in range(MOST_STEPS):
+            event, stop = False, min(until, self.next_event)
+            if stop - t > _ROUNDING * max(abs(t), abs(stop)) * 2.0:
+                t, event, terminate = self._internal_step(t, stop)
+                if terminate:
+                    return StepEnd(t, event, terminate)
+            elif stop > t:
+                t = stop
+                self._model.set_time(t)
+            if event or self.next_event <= t + _ROUNDING * max(abs(t), 1.0):
+                self._count_event(t)
+                return StepEnd(t, event=True, terminate=False)
+            if t >= until - _ROUNDING * max(abs(until), 1.0):
+                return StepEnd(until, event=False, terminate=False)
+        raise SolverError(f"at t = {t:.12g} s: the solver takes more than {MOST_STEPS} steps in one communication step")
+
+    def look(self, t: float) -> None:
+        """Put the FMU at an instant within the last internal step [s], in states from the solver's polynomial."""
+        self._model.move(t, self.solver.address(self.solver.between(t)))
+
+    def _internal_step(self, t: float, stop: float) -> StepEnd:
+        model, solver = self._model, self.solver
+        try:
+            if self._anew:
+                model.states(self._x)
+                solver.absolute[:] = solver.tolerance * model.nominals()
+                solver.restart(t)
+                self._anew = False
+            reached, root = solver.step(stop)
+        except SolverError as error:
+            raise self._explained(error, t) from error
+        model.move(reached, self._x)
+        if self.follower is not None:
+            self.follower(t, reached)
+            model.move(reached, self._x)
+        wanted, terminate = model.completed()
+        return StepEnd(reached, root or wanted, terminate)
+
+    def _explained(self, error: SolverError, t: float) -> SolverError:
+        """The solver's words with time and state, or those of the FMU where it refused what the solver asked."""
+        refused, self._model.failed = self._model.failed, None
+        known = error.worst is not None and self._model.state_count
+        worst = f"; it is worst for {self._state_name(error.worst or 0)}" if known else ""
+        why = f" ({str(refused).rstrip('.')})" if refused is not None else ""
+        words = f"the solver (CVODE) gives up at t = {t:.12g} s: {error}{why}{worst}"
+        return SolverError(words, status=ERROR if refused is None else refused.status)
+
+    def _count_event(self, t: float) -> None:
+        close = abs(t - self._last_event) <= TIME_TOLERANCE
+        self._at_once = self._at_once + 1 if close else 1
+        self._last_event = t
+        if self._at_once > MOST_AT_ONCE:
+            raise SolverError(
+                f"events do not settle at t = {t:.12g} s: {self._at_once} of them, each within {TIME_TOLERANCE:g} s of "
+                "the one before it (a model that chatters, or a ball that bounces faster and faster)"
+            )

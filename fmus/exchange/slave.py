@@ -1,0 +1,344 @@
+"""A model exchange FMU with the functions of co-simulation: what steps slaves cannot tell it from one.
+
+The functions of co-simulation that its library lacks, and those that co-simulation uses otherwise, stand in fmpy's
+table of functions as C functions: doStep, setters of inputs, saved states, ends of initialisation and of events. So
+whoever calls a library calls them, the compiled stepper too.
+
+In FMI 3 the slave has Event Mode and returns early at an event, which its master handles. In FMI 1 and 2 it handles
+events itself. An input that changes is an event: the FMU goes through Event Mode before the next step.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+from fmpy.fmi1 import FMICallException, fmi1EventInfo
+from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
+from fmpy.model_description import ModelDescription
+
+from fmus.exchange.cvode import SolverError
+from fmus.exchange.model_calls import EventIteration, ModelCalls, first_update
+from fmus.exchange.motion import Motion, Part
+from fmus.fmi.elements import elements_of
+from fmus.fmi.standard import DISCARD, ERROR, NEVER, OK, WARNING, Method, fmi_version
+from fmus.fmi.types import BOOLEANS, CTYPES
+
+TOLERANCE = 1e-8
+"""Relative, where neither the FMU nor its user states one."""
+
+_STEPS: dict[int, tuple[Any, ...]] = {
+    1: (ctypes.c_double, ctypes.c_double, ctypes.c_char),
+    2: (ctypes.c_double, ctypes.c_double, ctypes.c_int),
+    3: (ctypes.c_double, ctypes.c_double, ctypes.c_bool, *[ctypes.c_void_p] * 4),
+}
+"""Arguments of doStep behind the instance, by version."""
+
+
+@dataclass(frozen=True)
+class _Saved:
+    """A state: what the FMU gave, and what stands beside it."""
+
+    held: ctypes.c_void_p
+    sent: dict[tuple[str, bytes], bytes]
+    in_event_mode: bool
+    terminated: bool
+    next_event: float
+
+
+class CoSimulationFunctions:
+    """The functions of co-simulation over one instance, installed in fmpy's table of its functions.
+
+    Args:
+        slave: fmpy's model with its library loaded, not yet instantiated.
+        description: its model description. method: of the solver.
+    """
+
+    def __init__(self, slave: Any, description: ModelDescription, method: Method = "bdf") -> None:
+        self._slave, self._description, self._method = slave, description, method
+        self._version, self._functions = fmi_version(description), dict(slave._functions)
+        self.motion: Motion | None = None
+        self.tolerance, self.reached, self._start = TOLERANCE, 0.0, 0.0
+        self._sent = dict[tuple[str, bytes], bytes]()
+        self._saved, self._numbers = dict[int, _Saved](), count(1)
+        self._kept: list[Any] = []
+        for name, install in self._names().items():
+            self._install(f"fmi{self._version}{name}", *install)
+        for name in [n for n in self._functions if n[4:7] == "Set" and n[7:] in {*CTYPES, "Boolean"}]:
+            self._install(name, self._setter(name), *self._types_of(name))
+
+    # -- what a master asks beside functions -------------------------------------------------------------------------
+
+    def follow(self, part: Part | None) -> None:
+        """Have somebody called for each internal step of the solver.
+
+        Args:
+            part: see `Motion.follower`; None for nobody.
+        """
+        if self.motion is not None:
+            self.motion.follower = part
+
+    def last_time(self, kind: int) -> float:
+        """fmi2GetRealStatus: where the last step ended [s].
+
+        Args:
+            kind: of status, in the numbers of FMI.
+        """
+        return self.reached if kind == fmi2LastSuccessfulTime else 0.0
+
+    def has_terminated(self, kind: int = fmi2Terminated) -> bool:
+        """fmi2GetBooleanStatus: whether the FMU asked for the end.
+
+        Args:
+            kind: of status, in the numbers of FMI.
+        """
+        return kind == fmi2Terminated and self.motion is not None and self.motion.terminated
+
+    # -- initialisation ---------------------------------------------------------------------------------------------
+
+    def _set_up(self, call: Callable[..., int], instance: Any, *arguments: Any) -> int:
+        """setupExperiment of FMI 2, enterInitializationMode of FMI 3: both begin with the tolerance."""
+        defined, tolerance, self._start = arguments[:3]
+        self.tolerance = tolerance if defined and tolerance > 0.0 else TOLERANCE
+        self.motion = None
+        return call(instance, *arguments)
+
+    def _initialised(self, call: Callable[..., int], instance: Any) -> int:
+        status = call(instance)
+        if status <= WARNING:
+            self._begin()
+            if self._version == 2:
+                self._motion.settle()
+        return status
+
+    def initialize_first(self, tStart: float = 0.0, stopTime: float = 0.0, tolerance: float = TOLERANCE) -> None:
+        """Initialisation of FMI 1: the model exchange function in place of fmiInitializeSlave.
+
+        Args:
+            tStart: [s]. stopTime: of no interest. tolerance: relative, of the solver.
+        """
+        slave, info, self.tolerance = self._slave, fmi1EventInfo(), tolerance
+        slave.setTime(tStart)
+        slave.fmi1Initialize(slave.component, b"\x00", 0.0, ctypes.byref(info))
+        self._start = tStart
+        self._begin()
+        if self._motion.note(first_update(info)):
+            self._motion.settle()
+        else:
+            self._motion.leave_event_mode()
+
+    def _begin(self) -> None:
+        interface = self._description.modelExchange
+        declared = getattr(interface, "completedIntegratorStepNotNeeded", False)
+        complete = not declared if self._version < 3 else interface.needsCompletedIntegratorStep
+        model = ModelCalls(self._slave, self._version, self._counts(), self._functions, complete_steps=complete)
+        self.motion, self.reached = Motion(model, self.tolerance, self._method, self._state_name), self._start
+
+    def _counts(self) -> tuple[int, int]:
+        description = self._description
+        if self._version == 3:
+            return self._slave.getNumberOfContinuousStates(), self._slave.getNumberOfEventIndicators()
+        return int(description.numberOfContinuousStates or 0), int(description.numberOfEventIndicators or 0)
+
+    def _state_name(self, number: int) -> str:
+        rates = [unknown.variable for unknown in self._description.derivatives]
+        of = [v.derivative for v in rates if v.derivative is not None]
+        names = [element.name for variable in of for element in elements_of(variable)]
+        return f"state '{names[number]}'" if number < len(names) else f"state {number + 1}"
+
+    @property
+    def _motion(self) -> Motion:
+        if self.motion is None:
+            raise SolverError("the FMU is not initialised")
+        return self.motion
+
+    # -- steps ------------------------------------------------------------------------------------------------------
+
+    def _step(self, _call: Any, _instance: Any, t: float, h: float, _past: Any, *results: int) -> int:
+        if self._version == 3:
+            return self._step_to_event(t, t + h, *results)
+        end = self._motion.advance(t, t + h)
+        self.reached = end.time
+        return DISCARD if end.terminate else OK
+
+    def _step_to_event(self, t: float, until: float, event: int, terminate: int, early: int, reached: int) -> int:
+        motion = self._motion
+        if motion.in_event_mode:
+            motion.settle()
+        end = motion.to_event(t, until) if not motion.terminated else None
+        stands = t if end is None else end.time
+        ends = (event, end is not None and end.event), (terminate, end is None or end.terminate)
+        for address, said in (*ends, (early, stands < until)):
+            ctypes.c_bool.from_address(address).value = said
+        ctypes.c_double.from_address(reached).value = self.reached = stands
+        return OK
+
+    # -- inputs -----------------------------------------------------------------------------------------------------
+
+    def _setter(self, name: str) -> Callable[..., int]:
+        """A setter through Event Mode, where values differ from those that were set last."""
+        kind = name[7:]
+        held = (BOOLEANS[self._version] if kind == "Boolean" else CTYPES[kind])[0]
+        width, of_values = ctypes.sizeof(held), self._version == 3
+
+        def set_values(
+            call: Callable[..., int], instance: Any, references: int, n: int, values: int, *more: int
+        ) -> int:
+            key = name, ctypes.string_at(references, 4 * n)
+            content = ctypes.string_at(values, width * (more[0] if of_values else n))
+            if self._sent.get(key) == content:
+                return OK
+            if self.motion is not None:
+                self.motion.enter_event_mode()
+            status = call(instance, references, n, values, *more)
+            if status <= WARNING:
+                self._forget_overlapping(key)
+                self._sent[key] = content
+            return status
+
+        return set_values
+
+    def _forget_overlapping(self, key: tuple[str, bytes]) -> None:
+        """What other groups of variables were set to, as far as they share one with this group."""
+        name, references = key
+        own = set(memoryview(references).cast("I"))
+        for other in [k for k in self._sent if k != key and k[0] == name]:
+            if not own.isdisjoint(memoryview(other[1]).cast("I")):
+                del self._sent[other]
+
+    # -- events of FMI 3, which the master handles ---------------------------------------------------------------------
+
+    def _enter_event_mode(self, _call: Callable[..., int], _instance: Any) -> int:
+        self._motion.enter_event_mode()
+        return OK
+
+    def _enter_step_mode(self, _call: Any, _instance: Any) -> int:
+        self._motion.leave_event_mode()
+        return OK
+
+    def _update(self, call: Callable[..., int], instance: Any, *results: int) -> int:
+        status = call(instance, *results)
+        again, terminate, _, _, defined = (ctypes.c_bool.from_address(place).value for place in results[:5])
+        due = ctypes.c_double.from_address(results[5]).value if defined else NEVER
+        self._motion.note(EventIteration(again, terminate, due))
+        return status
+
+    # -- states -----------------------------------------------------------------------------------------------------
+
+    def _save(self, call: Callable[..., int], instance: Any, place: int) -> int:
+        """What follows begins anew, as it does once this state is restored."""
+        motion, held = self._motion, ctypes.c_void_p()
+        status = call(instance, ctypes.addressof(held))
+        if status <= WARNING:
+            number = next(self._numbers)
+            state = motion.in_event_mode, motion.terminated, motion.next_event
+            self._saved[number] = _Saved(held, dict(self._sent), *state)
+            ctypes.c_void_p.from_address(place).value = number
+            motion.begin_anew()
+        return status
+
+    def _restore(self, call: Callable[..., int], instance: Any, number: int) -> int:
+        saved, motion = self._saved[number], self._motion
+        status = call(instance, saved.held.value)
+        self._sent = dict(saved.sent)
+        motion.in_event_mode, motion.terminated, motion.next_event = (
+            saved.in_event_mode,
+            saved.terminated,
+            saved.next_event,
+        )
+        motion.begin_anew()
+        return status
+
+    def _release(self, call: Callable[..., int], instance: Any, place: int) -> int:
+        pointer = ctypes.c_void_p.from_address(place)
+        saved = self._saved.pop(pointer.value or 0, None)
+        pointer.value = None
+        return OK if saved is None else call(instance, ctypes.addressof(saved.held))
+
+    def _reset(self, call: Callable[..., int], instance: Any) -> int:
+        self.motion, self._sent = None, {}
+        return call(instance)
+
+    # -- installation -----------------------------------------------------------------------------------------------
+
+    def _names(self) -> dict[str, tuple[Any, ...]]:
+        """What is installed beside the setters: a function, and the types of its arguments behind the instance.
+
+        Their first argument is the function of the library.
+        """
+        pointer, step = ctypes.c_void_p, {"DoStep": (self._step, *_STEPS[self._version])}
+        if self._version == 1:
+            return step
+        word = "FMUstate" if self._version == 2 else "FMUState"
+        flag: Any = ctypes.c_int if self._version == 2 else ctypes.c_bool
+        begin = "SetupExperiment" if self._version == 2 else "EnterInitializationMode"
+        common: dict[str, tuple[Any, ...]] = {
+            begin: (self._set_up, flag, ctypes.c_double, ctypes.c_double, flag, ctypes.c_double),
+            "ExitInitializationMode": (self._initialised,),
+            "Reset": (self._reset,),
+            f"Get{word}": (self._save, pointer),
+            f"Set{word}": (self._restore, pointer),
+            f"Free{word}": (self._release, pointer),
+        }
+        if self._version == 2:
+            return step | common
+        return (
+            step
+            | common
+            | {
+                "EnterEventMode": (self._enter_event_mode,),
+                "EnterStepMode": (self._enter_step_mode,),
+                "UpdateDiscreteStates": (self._update, *[pointer] * 6),
+            }
+        )
+
+    def _types_of(self, name: str) -> Sequence[Any]:
+        """Types of the arguments of a setter behind the instance."""
+        size, pointer = ctypes.c_size_t, ctypes.c_void_p
+        return (pointer, size, pointer, size) if name.startswith("fmi3") else (pointer, size, pointer)
+
+    def _install(self, name: str, function: Callable[..., int], *types: Any) -> None:
+        """Put a function in the place of that of the library, which it is given first; None where there is none."""
+        prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *types)
+        own = self._functions.get(name)
+        library = None if own is None else prototype(ctypes.cast(own, ctypes.c_void_p).value or 0)
+
+        def called(*arguments: Any) -> int:
+            self._slave.reason = ""
+            try:
+                return function(library, *arguments)
+            except FMICallException as error:
+                self._slave.reason = str(error)
+                return int(error.status)
+            except SolverError as error:
+                self._slave.reason = str(error)
+                return error.status
+            except Exception as error:  # nothing may pass through C
+                self._slave.reason = f"{type(error).__name__}: {error}"
+                return ERROR
+
+        installed = prototype(called)
+        installed.argnames = tuple(f"argument {k}" for k in range(len(types) + 1))  # type: ignore[attr-defined]
+        self._kept.append(installed)
+        self._slave._functions[name] = installed
+        if own is None:
+            setattr(self._slave, name, lambda *arguments: self._slave._call(name, *arguments))
+
+
+def as_slave(slave: Any, description: ModelDescription, method: Method = "bdf") -> Any:
+    """fmpy's model of a model exchange FMU with the call surface of fmpy's slave; `functions` are what it got.
+
+    Args:
+        slave: with its library loaded, not yet instantiated.
+        description: its model description. method: of the solver.
+    """
+    functions = slave.functions = CoSimulationFunctions(slave, description, method)
+    instantiate, names = slave.instantiate, {"loggingOn", "logMessage", "callbacks", "functions", "visible"}
+    slave.instantiate = lambda **stated: instantiate(**{k: v for k, v in stated.items() if k in names})
+    slave.getRealStatus, slave.getBooleanStatus = functions.last_time, functions.has_terminated
+    if fmi_version(description) == 1:
+        slave.initialize = functions.initialize_first
+    return slave

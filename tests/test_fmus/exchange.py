@@ -1,0 +1,117 @@
+"""Builds FMUs from exchange.c: model exchange only, of FMI 1, 2 and 3, and the descriptions that go with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from test_fmus.build import compiled
+
+from fmus.pack import pack_fmu
+from fmus.toolchain.compile import library_name
+from fmus.toolchain.platforms import host_platform
+
+STATES = {"DECAY": 1, "BALL": 2, "TRAIN": 2, "STAIR": 0, "STEPS": 1, "CHATTERS": 0, "UNSETTLED": 0, "ESCAPES": 2}
+STATES |= {"REFUSES": 1}
+INDICATORS = {"BALL": 1}
+NAMES = ("position", "speed")
+COUNT = (
+    '<ScalarVariable name="count" valueReference="6" causality="output" variability="discrete"><Integer/>'
+    "</ScalarVariable>"
+)
+UNITS = (
+    '<UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit><Unit name="m/s"><BaseUnit m="1" s="-1"/></Unit>'
+    "</UnitDefinitions>"
+)
+
+
+def exchange_fmu(folder: Path, model: str, version: int = 2, *, saves: bool = True, units: bool = False) -> Path:
+    """A model exchange FMU.
+
+    Args:
+        folder: where it goes. model: a MODEL_... macro without the prefix. version: of FMI.
+        saves: whether it declares that its state can be saved. units: whether its variables have units.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    library = compiled("exchange.c", f"#define VERSION {version}\n#define MODEL_{model}\n", "fmu")
+    platform = host_platform()
+    content = {
+        "modelDescription.xml": _DESCRIPTIONS[version](model, saves, units).encode(),
+        f"binaries/{platform.fmi2_folder if version < 3 else platform.name}/{library_name('fmu')}": library,
+    }
+    return pack_fmu(content, folder / f"{model.lower()}{version}.fmu")
+
+
+def _unit(index: int, units: bool) -> str:
+    return f' unit="{("m", "m/s")[index]}"' if units else ""
+
+
+def _first(model: str, _saves: bool, units: bool) -> str:
+    outputs = "".join(
+        f'<ScalarVariable name="{NAMES[i]}" valueReference="{i + 1}" causality="output"><Real{_unit(i, units)}/>'
+        "</ScalarVariable>"
+        for i in range(STATES[model])
+    )
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="1.0" modelName="{model}" modelIdentifier="fmu" guid="1"
+  numberOfContinuousStates="{STATES[model]}" numberOfEventIndicators="{INDICATORS.get(model, 0)}">
+  <DefaultExperiment startTime="0" stopTime="3"/>
+  <ModelVariables>{outputs}
+    <ScalarVariable name="input" valueReference="3" causality="input"><Real start="0"/></ScalarVariable>
+    {COUNT}
+  </ModelVariables>
+</fmiModelDescription>"""
+
+
+def _second(model: str, saves: bool, units: bool) -> str:
+    n = STATES[model]
+    outputs = "".join(
+        f'<ScalarVariable name="{NAMES[i]}" valueReference="{i + 1}" causality="output"><Real{_unit(i, units)}/>'
+        "</ScalarVariable>"
+        for i in range(n)
+    )
+    rates = "".join(
+        f'<ScalarVariable name="der({NAMES[i]})" valueReference="{i + 4}" causality="local">'
+        f'<Real derivative="{i + 1}"/></ScalarVariable>'
+        for i in range(n)
+    )
+    listed = "".join(f'<Unknown index="{n + 3 + i}"/>' for i in range(n))
+    read = "".join(f'<Unknown index="{i + 1}"/>' for i in range(n))
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="{model}" guid="1" numberOfEventIndicators="{INDICATORS.get(model, 0)}">
+  <ModelExchange modelIdentifier="fmu" canGetAndSetFMUstate="{str(saves).lower()}"/>{UNITS if units else ""}
+  <DefaultExperiment startTime="0" stopTime="3"/>
+  <ModelVariables>{outputs}
+    <ScalarVariable name="input" valueReference="3" causality="input"><Real start="0"/></ScalarVariable>
+    {COUNT}
+    {rates}
+  </ModelVariables>
+  <ModelStructure><Outputs>{read}<Unknown index="{n + 2}"/></Outputs>
+    <Derivatives>{listed}</Derivatives></ModelStructure>
+</fmiModelDescription>"""
+
+
+def _third(model: str, saves: bool, units: bool) -> str:
+    n = STATES[model]
+    outputs = "".join(
+        f'<Float64 name="{NAMES[i]}" valueReference="{i + 1}" causality="output"{_unit(i, units)}/>' for i in range(n)
+    )
+    rates = "".join(
+        f'<Float64 name="der({NAMES[i]})" valueReference="{i + 4}" derivative="{i + 1}"/>' for i in range(n)
+    )
+    listed = "".join(f'<ContinuousStateDerivative valueReference="{i + 4}"/>' for i in range(n))
+    indicators = '<EventIndicator valueReference="1"/>' if model in INDICATORS else ""
+    return f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="{model}" instantiationToken="1">
+  <ModelExchange modelIdentifier="fmu" canGetAndSetFMUState="{str(saves).lower()}" needsCompletedIntegratorStep="true"/>
+  {UNITS if units else ""}
+  <DefaultExperiment startTime="0" stopTime="3"/>
+  <ModelVariables><Float64 name="time" valueReference="99" causality="independent" variability="continuous"/>{outputs}
+    <Float64 name="input" valueReference="3" causality="input" start="0"/>
+    <Int32 name="count" valueReference="6" causality="output"/>{rates}
+  </ModelVariables>
+  <ModelStructure>{"".join(f'<Output valueReference="{i + 1}"/>' for i in range(n))}<Output valueReference="6"/>
+    {listed}{indicators}</ModelStructure>
+</fmiModelDescription>"""
+
+
+_DESCRIPTIONS = {1: _first, 2: _second, 3: _third}
