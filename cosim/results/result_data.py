@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import Any, Literal
 
 import numpy as np
 
 from cosim.diagnostics.messages import Message
+from cosim.errors import nearest
 from fmus.tables.table import SCREEN_ROWS, Column, FirstScreen, Parts, Table, name_column, text_column
 
 
@@ -136,12 +136,15 @@ class ResultData(FirstScreen, Mapping[str, np.ndarray]):
         """Values of one signal in its SI unit, shape (rows,).
 
         Raises:
-            KeyError: the signal was not recorded; the message lists the nearest names.
+            KeyError: the signal was not recorded; the message lists the nearest names. The key is no name: the message
+                says how rows are chosen.
         """
         names = self.table.dtype.names or ()
+        if not isinstance(name, str):
+            example = names[1] if len(names) > 1 else "time"
+            raise KeyError(f"{name!r} is no name of a signal; a name is wanted, and rows behind it: [{example!r}][0]")
         if name not in names:
-            near = ", ".join(get_close_matches(name, names, 3)) or ", ".join(names)
-            raise KeyError(f"signal {name!r} was not recorded; nearest: {near}")
+            raise KeyError(f"signal {name!r} was not recorded; {nearest(name, names)}")
         return np.asarray(self.table[name])
 
     def __iter__(self) -> Iterator[str]:

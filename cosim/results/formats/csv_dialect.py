@@ -14,6 +14,8 @@ from pathlib import Path
 from cosim.errors import OutputError
 
 START = 1 << 16  # bytes looked at to find the encoding
+COMMENTS = ("#", "%")
+"""What a line begins with that is no part of the table, before the names of the columns."""
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
 
 
@@ -68,10 +70,7 @@ def csv_dialect(path: Path) -> Dialect:
     """
     encoding = _encoding(path)
     with path.open(encoding=encoding, errors="replace", newline="") as file:
-        numbered = ((n, line) for n, line in enumerate(_lines(file), 1) if line.strip())
-        number, line = next(numbered, (0, ""))
-        if line.strip().lower() in ("sep=;", "sep=,", "sep=\t", '"sep=;"'):  # a hint of spreadsheets
-            number, line = next(numbered, (0, ""))
+        number, line = _headings((n, line) for n, line in enumerate(_lines(file), 1) if line.strip())
     if not line:
         raise OutputError(
             f"{path} is empty: expected a line with the names of the columns, 'time' first, and rows of numbers."
@@ -79,6 +78,33 @@ def csv_dialect(path: Path) -> Dialect:
     separator = _separator(line)
     cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     return Dialect(path, encoding, separator, tuple(cell.strip() for cell in cells), number)
+
+
+def _headings(numbered: Iterator[tuple[int, str]]) -> tuple[int, str]:
+    """The line with the names of the columns and its number; hints of spreadsheets and comments before it are passed
+    over. Where numbers follow at once the last comment has the names, as NumPy writes them.
+    """
+    comment: tuple[int, str] | None = None
+    for number, line in numbered:
+        text = line.strip()
+        if text.startswith(COMMENTS):
+            comment = number, text.lstrip("".join(COMMENTS)).strip()
+        elif text.lower() not in ("sep=;", "sep=,", "sep=\t", '"sep=;"'):
+            return comment if comment is not None and is_number(text.split(_separator(text))[0]) else (number, line)
+    return 0, ""
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell is a number, perhaps with a decimal comma.
+
+    Args:
+        text: of the cell.
+    """
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 def _encoding(path: Path) -> str:

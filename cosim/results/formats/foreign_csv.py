@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.errors import OutputError
 from cosim.results.formats.columns import result_of_columns
-from cosim.results.formats.csv_dialect import SEPARATORS, Dialect, csv_dialect
+from cosim.results.formats.csv_dialect import COMMENTS, SEPARATORS, Dialect, csv_dialect, is_number
 from cosim.results.formats.headings import split_unit
 from cosim.results.result_data import ResultData
 
@@ -38,7 +38,7 @@ def read_foreign_csv(path: Path) -> ResultData:
     headings = [*dialect.headings]
     if len(headings) > 1 and headings[-1] == "":  # OpenModelica and spreadsheets close lines with a separator
         headings.pop()
-    if all(_is_number(heading) for heading in headings):
+    if all(is_number(heading) for heading in headings):
         raise OutputError(
             f"{path}, line {dialect.lines}: expected names of columns, 'time' first, got numbers only. Add them."
         )
@@ -53,7 +53,7 @@ def _units_line(dialect: Dialect, headings: list[str]) -> tuple[Dialect, dict[st
     """Some tools write a second line of units: the dialect without it, and the units by heading."""
     number, line = next(dialect.numbered_rows(), (0, ""))
     cells = [cell.strip("[]() ") for cell in dialect.cells(line)]
-    if not cells or cells[0] not in _TIME_UNITS or any(_is_number(cell) for cell in cells if cell != "1"):
+    if not cells or cells[0] not in _TIME_UNITS or any(is_number(cell) for cell in cells if cell != "1"):
         return dialect, {}
     units = {heading: unit if unit not in ("", "-") else "1" for heading, unit in zip(headings, cells, strict=False)}
     return Dialect(dialect.path, dialect.encoding, dialect.separator, dialect.headings, number), units
@@ -82,8 +82,7 @@ def _cell_by_cell(dialect: Dialect, headings: list[str]) -> tuple[list[str], np.
         if len(cells) != len(headings) and not rows:
             headings = _joined(headings, len(cells))
         if len(cells) != len(headings):
-            expected = f"expected {len(headings)} cells separated by {SEPARATORS[dialect.separator]}"
-            raise OutputError(f"{dialect.path}, line {number}: {expected}, got {len(cells)}.")
+            raise OutputError(f"{dialect.path}, line {number}: {_expected(dialect, headings, not rows)} {len(cells)}.")
         parts = [_numbers(cell, dialect, number, heading) for cell, heading in zip(cells, headings, strict=True)]
         widths = widths or [len(part) for part in parts]
         wrong = next((h for h, part, width in zip(headings, parts, widths, strict=True) if len(part) != width), None)
@@ -93,6 +92,17 @@ def _cell_by_cell(dialect: Dialect, headings: list[str]) -> tuple[list[str], np.
             )
         rows.append([value for part in parts for value in part])
     return _elements(headings, widths), np.array(rows)
+
+
+def _expected(dialect: Dialect, headings: list[str], first: bool) -> str:
+    """What a row with another number of cells than names differs from; `first`: it is the first one."""
+    expected = f"expected {len(headings)} cells separated by {SEPARATORS[dialect.separator]}"
+    if first:  # as likely the names are none
+        expected += (
+            f", as many as names in line {dialect.lines} (what stands before the names begins with "
+            f"{' or '.join(COMMENTS)})"
+        )
+    return f"{expected}, got"
 
 
 def _joined(headings: list[str], count: int) -> list[str]:
@@ -133,11 +143,3 @@ def _number(text: str) -> float:
     if match is not None:
         return float(match["sign"] + ("inf" if match["what"].lower() == "inf" else "nan"))
     return float(text if text.count(",") != 1 else text.replace(",", "."))
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text.replace(",", "."))
-    except ValueError:
-        return False
-    return True

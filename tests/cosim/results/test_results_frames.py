@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -46,8 +48,17 @@ def test_chosen_signals_only() -> None:
     result = odd_result()
     assert list(result.to_pandas(["units", "a"]).columns) == ["units", "a"]
     assert [n for n in result.to_xarray(["units"]).data_vars if not str(n).startswith("balise_")] == ["units"]
-    with pytest.raises(KeyError, match=r"'unit' was not recorded; nearest: units"):
+    with pytest.raises(KeyError, match=r"'unit' was not recorded; did you mean 'units'"):
         result.to_pandas(["unit"])
+
+
+@pytest.mark.parametrize("key", [0, -1, None, 1.5, ("a",)])
+def test_a_key_that_is_no_name_is_refused_in_words(key: Any) -> None:
+    """A result is a mapping: rows are chosen behind the name of a signal."""
+    result = odd_result()
+    with pytest.raises(KeyError, match=rf"{re.escape(repr(key))} is no name of a signal; .*\[0\]"):
+        result[key]
+    assert [name in result for name in ("a", key, "x")] == [True, False, False]
 
 
 def test_telegrams_as_rows() -> None:

@@ -35,6 +35,9 @@ TABLES = {
     "time in the middle": ("v,t,b[1]\n10,0,1\n20,0.5,2\n", {}),
     "a column twice": ("time,v,b[1],v\n0,10,1,10\n0.5,20,2,20\n", {}),
     "spaces": ("time, v (km/h), b[1] \n 0, 36, 1\n 0.5, 72, 2 \n", SI),
+    "comments above": ("# of the bench, 2026\n\n% 2 Hz\ntime,v [km/h],b[1]\n0,36,1\n0.5,72,2\n", SI),
+    "names in a comment, as of NumPy": ("# run 7\n# time,v,b[1]\n0,10,1\n0.5,20,2\n", {}),
+    "names in a comment, decimal commas": ("# time;v;b[1]\n0,0;10;1\n0,5;20;2\n", {}),
     "numbers in quotes": ('"time","v","b[1]"\n"0","10","1"\n"0,5","20","2"\n', {}),
 }
 
@@ -120,6 +123,8 @@ def test_dialects_agree(
         ("0,1\n1,2\n", "line 1: expected names of columns"),
         ("time,a\n0,1\n\n1,two\n", r"line 4, column 'a': expected a number, got 'two'"),
         ("time,a\n0,1\n1\n", "line 3: expected 2 cells separated by commas, got 1"),
+        ("of the bench\ntime,a\n0,1\n", "line 2: expected 1 .* as names in line 1 .* begins with # or %.*, got 2"),
+        ("# nothing else\n", "is empty"),
         ("time;a\n0;1\n1;2;3\n", "line 3: expected 2 cells separated by semicolons, got 3"),
         ("time,a\n0,1\n2,1\n1,1\n", r"time goes backwards in row 3, from 2 to 1 s"),
         ("time,a\n0,1\nnan,1\n", r"the time in row 2 is not a number"),
