@@ -16,7 +16,7 @@ from cosim import studies
 from cosim.cli.arguments import FIGURE_FILES, MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
 from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import load_scenario, simulated_time_bar
-from cosim.errors import OutputError
+from cosim.errors import OutputError, ScenarioError
 from cosim.evaluation.consistency import filter_consistency
 from cosim.evaluation.consistency_table import consistency_table
 from cosim.evaluation.cost import cost_table
@@ -104,6 +104,7 @@ ARGUMENTS = (
 
 def execute(options: argparse.Namespace) -> Output:
     """Run and write, as the options ask; everything computed is written also when the run fails."""
+    _demand_seeds(options)
     scenario = load_scenario(options)
     directory = (Path(options.out) if options.out is not None else Path("results") / scenario.name).absolute()
     check_writable(directory, scenario.table().report.tables)
@@ -125,6 +126,17 @@ def execute(options: argparse.Namespace) -> Output:
         outcome = outcome.with_summary(seed_study=study.to_data())
         paths = _written(outcome, directory, options) | {"seeds": directory / SEEDS / "index.csv"}
     return _output(outcome, study, paths | ({"calls": call_log} if call_log is not None else {}), options)
+
+
+def _demand_seeds(options: argparse.Namespace) -> None:
+    """Refuse what is about several runs where there is one."""
+    asked = many_runs(options) | {"workers": options.workers > 1}
+    of_many = [f"--{key}" for key, value in asked.items() if value]
+    if of_many and not options.seeds:
+        raise ScenarioError(
+            f"{', '.join(of_many)}: only for several runs; say how many with --seeds N, or leave "
+            f"{'it' if len(of_many) == 1 else 'them'} out."
+        )
 
 
 class _Results:

@@ -19,7 +19,7 @@ from cosim.run.missing_sources import require_sources
 from cosim.run.network_remarks import network_warnings
 from cosim.run.plausible_masses import mass_warnings
 from cosim.run.remarks import Remarks
-from cosim.run.step_schedule import StepSchedule, stepping_groups
+from cosim.run.step_schedule import StepSchedule, listeners_that_reorder, stepping_groups
 from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
 
@@ -63,7 +63,7 @@ def check_task(task: RunTask, building: Callable[[str], None], remarks: Remarks,
         remarks.warn(*network_warnings(coupled.network, task.table, loaded.components, task.where))
     balises = balise_roles(task.table.balises, loaded.components, task.where)
     task = complete_tables(task, coupled, balises, remarks)
-    schedule = _make_schedule(task.table, coupled, balises)
+    schedule = _make_schedule(task.table, coupled, balises, remarks)
     certificates = check_observers(task, coupled, stated, balises.receivers, remarks)
     return Checked(task, stated, loaded, coupled, balises, schedule, certificates)
 
@@ -101,8 +101,9 @@ def _idle_settings(table: ScenarioTable) -> list[str]:
     ]
 
 
-def _make_schedule(table: ScenarioTable, coupled: Coupled, balises: BaliseRoles) -> StepSchedule:
+def _make_schedule(table: ScenarioTable, coupled: Coupled, balises: BaliseRoles, remarks: Remarks) -> StepSchedule:
     """Algorithm and order of a scenario."""
     groups = stepping_groups(table, coupled, balises)
+    remarks.note(*listeners_that_reorder(table, coupled, balises, groups))
     choice = choose_algorithm(table.master.algorithm, groups, coupled.components)
     return StepSchedule(choice, [name for group in groups for name in group.names])

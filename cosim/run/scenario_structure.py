@@ -30,7 +30,7 @@ from cosim.run.coupled import Coupled, couple
 from cosim.run.described_components import describe_component
 from cosim.run.loaded_components import names_with_starts
 from cosim.run.network import Network
-from cosim.run.step_schedule import stepping_groups
+from cosim.run.step_schedule import listeners_that_reorder, stepping_groups
 from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
 from cosim.structure.run_structure import Structure
@@ -251,10 +251,14 @@ def scenario_structure(task: RunTask) -> Structure:
         components = {n: describe_component(n, t, task.folder, places[n], span) for n, t in table.components.items()}
         coupled = couple(task, parse_connections(table.connections, where), components)
         roles = balise_roles(table.balises, components, where)
-        return _structure(task, coupled, stepping_groups(table, coupled, roles), _balises(table, roles))
+        groups = stepping_groups(table, coupled, roles)
+        notes = listeners_that_reorder(table, coupled, roles, groups)
+        return _structure(task, coupled, groups, _balises(table, roles), notes)
 
 
-def _structure(task: RunTask, coupled: Coupled, groups: Sequence[Group], balises: Balises | None) -> Structure:
+def _structure(
+    task: RunTask, coupled: Coupled, groups: Sequence[Group], balises: Balises | None, notes: Sequence[str]
+) -> Structure:
     table, components, connections, clocks = task.table, coupled.components, coupled.connections, coupled.clocks
     choice, refusal = _choice(table, groups, components)
     order = [n for group in groups for n in group.names]
@@ -277,7 +281,7 @@ def _structure(task: RunTask, coupled: Coupled, groups: Sequence[Group], balises
         reason=choice.reason,
         balises=balises,
         network=None if coupled.network is None else _network(coupled.network),
-        warnings=(*_warnings(table, components, connections), *choice.notes, *refusal),
+        warnings=(*_warnings(table, components, connections), *choice.notes, *notes, *refusal),
     )
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from cosim.coupling.connection import Connection
 from cosim.coupling.graph import Group, execution_groups
-from cosim.coupling.instants import recorded_order
+from cosim.coupling.instants import Signal, held_signals, recorded_order
 from cosim.coupling.strong import topological
 from cosim.master.algorithms.choose import AlgorithmChoice
 from cosim.run.balise_service import BaliseRoles
@@ -51,3 +52,51 @@ def stepping_groups(table: ScenarioTable, coupled: Coupled, balises: BaliseRoles
     train = [name for name in (balises.plant or truth,) if name in components]
     slow = [name for name, component in table.components.items() if component.every > 1]
     return execution_groups(components, connections, before, train, slow)
+
+
+def listeners_that_reorder(
+    table: ScenarioTable, coupled: Coupled, balises: BaliseRoles, groups: Sequence[Group]
+) -> list[str]:
+    """A sentence for each loop whose order follows from connections to components that only listen to it, and which so
+    moves otherwise than without them: another of its signals is held over a step.
+
+    Args:
+        table: the scenario. coupled: its components and connections. balises: who has to do with them.
+        groups: from `stepping_groups`.
+    """
+    if table.master.algorithm == "jacobi":  # everything is held
+        return []
+    found = []
+    for group in groups:
+        members = set(group.names)
+        listened = [c for c in coupled.stepped if c.source[0] in members and c.target[0] not in members]
+        inside = [c for c in coupled.stepped if c.source[0] in members and c.target[0] in members]
+        if len(members) == 1 or not listened:
+            continue
+
+        def held(order: Sequence[Group], inside: list[Connection] = inside) -> frozenset[Signal]:
+            return held_signals(coupled.components, inside, [name for one in order for name in one.names])
+
+        def without(left_out: Sequence[Connection]) -> list[Group]:
+            rest = replace(coupled, routed=[c for c in coupled.routed if c not in left_out])
+            return stepping_groups(table, rest, balises)
+
+        now, alone = held(groups), held(without(listened))
+        if now != alone:
+            one_by_one = [c for c in listened if held(without([c])) != now]
+            found.append(_reordered(group.names, one_by_one or listened, now, alone))
+    return found
+
+
+def _reordered(
+    names: Sequence[str], because: Sequence[Connection], now: frozenset[Signal], alone: frozenset[Signal]
+) -> str:
+    return (
+        f"The order of stepping is {', '.join(names)} because of {', '.join(map(str, because))}: in this loop "
+        f"{_named(now)} is held over a step, where it would be {_named(alone)} if nobody outside listened. So its "
+        "signals differ a little from those of the same scenario without; a smaller step makes that smaller."
+    )
+
+
+def _named(signals: frozenset[Signal]) -> str:
+    return ", ".join(sorted(map(".".join, signals))) or "no signal"

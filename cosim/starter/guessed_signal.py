@@ -81,6 +81,9 @@ _FOREIGN: Set[str] = _words(
 )
 """Words that speak of something else: a reference, a limit, an error, another force."""
 
+_FORCES = _words("force kraft haftkraft forza fuerza forca effort creepforce")
+"""Words of forces: what adhesion is where no unit says so."""
+
 _BRAKING = _words("brake braking brems bremse bremskraft frein freinage freno")
 """Words of brakes."""
 _DRIVING = _words("traction tractive trac zug zugkraft antrieb trazione traccion tracao propulsion drive")
@@ -196,8 +199,10 @@ def _rate(quantity: Quantity, signal: GuessedSignal) -> tuple[int, str]:
     if signal.stated in UNITS:
         return (_STATED if signal.stated == quantity else 0), "as it is stated"
     has_unit = any(fits(signal, unit) for unit in UNITS[quantity]) or (quantity == "slip" and signal.unit is None)
-    if signal.meaning is not None and not has_unit:
+    if (signal.meaning is not None and not has_unit) or signal.type == "Boolean":
         return 0, ""
+    if quantity == "adhesion_force" and not has_unit and not _FORCES & set(_words_of(signal.name)):
+        return 0, ""  # a coefficient or a state of the rail is named after adhesion as well
     named, said = _named(quantity, signal.name, has_unit), _described(quantity, signal.description)
     if not named and not said and (not has_unit or quantity in _BY_NAME_ONLY):
         return 0, ""

@@ -272,3 +272,12 @@ def test_a_usage_error_exits_with_2(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_long_run_says_where_its_time_went(seconds: list[float], wall: float, said: str) -> None:
     parts = [{"name": name, "seconds": spent} for name, spent in zip(("ship", "allocation"), seconds, strict=False)]
     assert _slowest({"components": parts, "wall_seconds": wall}) == said
+
+
+@pytest.mark.parametrize("words", [["--workers", "2"], ["--resume"], ["--retry", "--scheduler", "tcp://h:1"]])
+def test_what_is_for_several_runs_is_refused_for_one(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    """It did nothing before, and said nothing of that."""
+    assert main(["run", *words]) == 2
+    said = capsys.readouterr().err
+    assert all(word in said for word in words if word.startswith("--"))
+    assert "only for several runs; say how many with --seeds N" in said

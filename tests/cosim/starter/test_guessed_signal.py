@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cosim.starter.guessed_signal import GuessedSignal, Quantity, _words_of, guess
+from cosim.starter.guessed_signal import UNITS, WORDS, GuessedSignal, Quantity, _words_of, guess
 from plant_models.hybrid.units import parse_unit
 
 
@@ -63,6 +63,7 @@ NAMED: list[tuple[Quantity, str, str | None]] = [
     ("effort", "trac_brake_force", "N"),
     ("slip", "Schlupf", "%"),
     ("adhesion_force", "Haftkraft", "kN"),
+    ("adhesion_force", "force_adhesion", None),
     ("mass", "m", "kg"),
     ("mass", "Masse", "t"),
 ]
@@ -95,6 +96,9 @@ STRANGERS: list[tuple[Quantity, str, str | None, str]] = [
     ("effort", "torque", "N.m", ""),
     ("effort", "adhesion_force", "N", ""),
     ("slip", "y", None, ""),
+    ("adhesion_force", "adhesion_degraded", None, "0 nominal .. 1 degraded adhesion"),
+    ("adhesion_force", "adhesion", None, ""),
+    ("adhesion_force", "adhesion_coefficient", "1", "adhesion force over load"),
     ("mass", "x", "kg", ""),
 ]
 UNSURE = {("position", "radius"), ("position", "s"), ("speed", "u1")}
@@ -107,6 +111,13 @@ def test_what_is_something_else_is_not_taken_for_it(
     """A few look so much like it that they may be offered, but never as sure."""
     found = guess(quantity, [signal(name, unit, description)])
     assert found is None or ((quantity, name) in UNSURE and found.sureness != "sure")
+
+
+@pytest.mark.parametrize("quantity", UNITS)
+def test_a_truth_value_is_no_quantity(quantity: Quantity) -> None:
+    """However it is named."""
+    for name in sorted({word for words in WORDS.values() for word in words}):
+        assert guess(quantity, [GuessedSignal(name, type="Boolean")]) is None
 
 
 def test_the_best_comes_first_and_the_others_are_reported() -> None:
