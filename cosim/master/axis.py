@@ -24,3 +24,8 @@ class TimeAxis:
     def stop(self) -> float:
         """The last communication point [s]."""
         return self[self.count]
+
+    @property
+    def announced_stop(self) -> float:
+        """The end that is announced to components [s]: behind no step, rounded as they round it themselves."""
+        return max(self.stop, self[self.count - 1] + self.step) if self.count else self.stop

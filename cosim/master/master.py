@@ -201,7 +201,7 @@ class Master:
         compiled = self.stepper.compiled
         begin = perf_counter()
         try:
-            self.exchange_rounds = initialise(self.plan, self.axis.start, self.axis.stop, self.initialised)
+            self.exchange_rounds = initialise(self.plan, self.axis.start, self.axis.announced_stop, self.initialised)
             self.system.start(self.axis.start)
             self.recorder.add(self.axis.start, self.plan.values)
             self._check_finite(self.axis.start)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from coupled_runs import prepare
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from mock_slaves import Mock, component
 from test_fmus.build import linear_fmu
@@ -24,6 +24,7 @@ from cosim.components.loading import load_fmu
 from cosim.components.recording import RecordingComponent
 from cosim.components.recording_data import Recording
 from cosim.errors import RunError
+from cosim.master.axis import TimeAxis
 from cosim.master.control.multirate import set_rates
 from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import close
@@ -240,3 +241,31 @@ def test_one_that_cannot_be_initialised_again_fails_with_its_own_words() -> None
 
     with pytest.raises(RunError, match="reading y failed: get after set"):
         ran_behind_a_jump(Final)
+
+
+class _EndsInTime(Mock):
+    """Refuses a step that leads behind the end that was announced, by its own step of 1e-7 s and its own rounding."""
+
+    outputs: ClassVar[dict[str, Any]] = {"y": 0.0}
+    end = 0.0
+
+    def enterInitializationMode(self, startTime: float | None = None, stopTime: float | None = None) -> None:
+        self.end = stopTime or 0.0
+        super().enterInitializationMode(startTime, stopTime)
+
+    def move(self, t: float, h: float) -> None:
+        assert t + 1e-7 <= self.end
+
+
+@given(step=st.floats(1e-7, 10.0), start=st.sampled_from([0.0, 1e4]) | st.floats(-1e5, 1e5), count=st.integers(1, 400))
+@example(step=1e-7, start=0.0, count=100)
+def test_no_step_leads_behind_the_end_that_was_announced(step: float, start: float, count: int) -> None:
+    axis = TimeAxis(start, step, count)
+    last, end = axis[count - 1], axis.announced_stop
+    assert max(last + step, axis.stop) == end
+    assert end - axis.stop <= 2.0 * np.spacing(max(abs(start), abs(end)))
+
+
+def test_an_fmu_that_refuses_steps_behind_the_end_comes_to_it() -> None:
+    rows = rows_of([component(_EndsInTime(), "m")], [], 1e-7, 100, "python")
+    assert len(rows) == 101
