@@ -78,6 +78,14 @@ class DescribedComponent(fmi.Described):
         """
         return None
 
+    def texts(self, name: str) -> Sequence[str]:
+        """The texts that the numbers of an output stand for, 1 for the first; none where they are numbers.
+
+        Args:
+            name: of the output.
+        """
+        return ()
+
     def choose_tolerance(self, tolerance: float | str | None) -> None:
         """Another relative tolerance than the declared one. FMI 1.0 knows of none.
 

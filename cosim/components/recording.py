@@ -21,6 +21,7 @@ from cosim.components.recording_data import Chosen, Recording, make_recording
 from cosim.errors import CosimError, CouplingError, ScenarioError
 from cosim.results.load_result import load_result
 from cosim.results.read_once import read_once
+from cosim.results.result import Result
 from fmu_observer.annotated_variable import CAN_BE_MISSING, AnnotatedVariable
 from fmus.fmi.standard import TIME_TOLERANCE
 
@@ -225,10 +226,20 @@ class RecordingComponent(FMI3Component):
         Args:
             name: of the column.
         """
-        place = [signal.name for signal in self.recording.signals].index(name)
-        values, rows = np.unique(self.recording.values[:, place], return_index=True)
+        values, rows = np.unique(self.recording.values[:, self._place(name)], return_index=True)
         first, time = self.recording.first_row, self.recording.time
         return [(float(values[i]), f"row {first + rows[i] + 1} (t = {time[rows[i]]:.6g} s)") for i in np.argsort(rows)]
+
+    def texts(self, name: str) -> Sequence[str]:
+        """The texts that the numbers of a column stand for, 1 for the first; none of a column of numbers.
+
+        Args:
+            name: of the column.
+        """
+        return self.recording.texts.get(name, ())
+
+    def _place(self, name: str) -> int:
+        return [signal.name for signal in self.recording.signals].index(name)
 
     def course_of(self, name: str, *, sampled: bool) -> bool:
         """Whether an input follows a column wherever the component stands.
@@ -245,7 +256,7 @@ class RecordingComponent(FMI3Component):
         Args:
             names: of the columns.
         """
-        places = np.array([[s.name for s in self.recording.signals].index(name) for name in names], dtype=np.intp)
+        places = np.array([self._place(name) for name in names], dtype=np.intp)
         return ColumnCourse(self.recording, places)
 
     def variable(self, name: str, *causalities: str) -> ModelVariable:
@@ -266,7 +277,7 @@ def describe(recording: Recording) -> ModelDescription:
             type="Int32" if is_whole else "Float64",
             causality="output",
             variability="discrete" if is_whole or held else signal.variability,
-            description=signal.description,
+            description=signal.description or _listed(recording.texts.get(signal.name, ())),
             unit=None if signal.unit == "1" else signal.unit,
             displayUnit=signal.display_unit,
         )
@@ -305,12 +316,20 @@ def load_recording(
     """
     try:
         return make_recording(
-            read_once(load_result, path), str(path), component, name, interpolation, span, can_be_missing
+            read_once(_load_with_texts, path), str(path), component, name, interpolation, span, can_be_missing
         )
     except ScenarioError as error:
         raise ScenarioError(f"{where}: {error}") from error
     except CosimError as error:
         raise ScenarioError(f"{where}: recording {path} cannot be read: {error}") from error
+
+
+def _listed(texts: Sequence[str]) -> str:
+    return ", ".join(f"{number} {text}" for number, text in enumerate(texts, 1))
+
+
+def _load_with_texts(path: Path) -> Result:
+    return load_result(path, texts=True)
 
 
 def _whole_number_columns(recording: Recording) -> Sequence[bool]:

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cosim.errors import ScenarioError, nearest
+from cosim.results.formats.columns import TEXTS
 from cosim.results.result import Result, SignalInfo
 from fmus.fmi.standard import NEVER, TIME_TOLERANCE
 
@@ -43,6 +44,7 @@ class Recording:
         chosen: names of the columns of which it was said whether they are held.
         lines: columns that the others follow on lines within their steps: those of a table that are not held, and of a
             run those that were lines in it. All others give the value of the end of a step, as they did in the run.
+        texts: of columns of texts, what their numbers stand for, 1 for the first.
         first_row: how many rows of the table stand before the first one that is played back.
     """
 
@@ -61,6 +63,7 @@ class Recording:
     held_links: frozenset[str] = frozenset()
     fresh_links: frozenset[str] = frozenset()
     first_row: int = 0
+    texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     @cached_property
     def digest(self) -> str:
@@ -140,6 +143,7 @@ def make_recording(
         run.
     """
     chosen = _chosen(result, source, component, name)
+    texts = result.summary.get(TEXTS, {})
     said = said_of(interpolation, [signal.name for signal in chosen.values()], source)
     time = np.array(result.time, dtype=float)
     _check_time(time, source, span)
@@ -170,6 +174,7 @@ def make_recording(
         shared,
         fresh,
         rows.start or 0,
+        {s.name: list(texts[c]) for c, s in chosen.items() if c in texts},
     )
 
 

@@ -133,6 +133,9 @@ def _of_elements(pair: Link, components: Mapping[str, Component]) -> list[Connec
     transformation = more[0] if more else Transformation()
     source = split_name(source_name, components, "Connection source")
     target = split_name(target_name, components, "Connection target")
+    components[source[0]].variable(source[1], *SOURCES)
+    if components[source[0]].texts(source[1]):
+        transformation = _by_item(components, source, target, transformation)
     exact = _exact(components, source, target, transformation)
     _require_leaving_out(components, source, target)
     factor, offset = _conversion(components, source, target) if transformation.convert_units else (1.0, 0.0)
@@ -244,6 +247,30 @@ def _exact(
     versions = [components[end[0]].fmi_version for end in (source, target)]
     kinds = {getter_type(v.type, version) for v, version in zip((output, name), versions, strict=True)}
     return kinds <= _LONG_TYPES and transformation == Transformation()
+
+
+def _by_item(
+    components: Mapping[str, Component], source: tuple[str, str], target: tuple[str, str], stated: Transformation
+) -> Transformation:
+    """What a column of texts does to its target: each text is the item, or the truth value, that it names.
+
+    Raises:
+        CouplingError: a text names nothing of the target, or something else is stated for the connection.
+    """
+    sender, variable = components[source[0]], components[target[0]].variable(target[1], "input")
+    where = f"Connection {'.'.join(source)} -> {'.'.join(target)}"
+    if stated != Transformation() or variable.type not in ("Enumeration", "Boolean"):
+        raise CouplingError(
+            f"{where}: the column holds texts, which drive enumerations and truth values as they are; "
+            f"{'.'.join(target)} is a {variable.type}."
+        )
+    items, table = sender.texts(source[1]), list[tuple[float, float]]()
+    for number, place in sender.known_values(source[1]) or ():
+        try:
+            table.append((number, float(typed_value(variable, items[int(number) - 1]))))
+        except ValueError as error:
+            raise CouplingError(f"{where}: {place}: {error}") from error
+    return Transformation(table=tuple(table))
 
 
 def _misfit(source: ModelVariable, target: ModelVariable) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from cosim.errors import OutputError
-from cosim.results.formats.columns import check_time
+from cosim.results.formats.columns import TEXTS, check_time
 from cosim.results.formats.foreign_csv import read_foreign_csv
 from cosim.results.formats.foreign_mat import read_foreign_mat
 from cosim.results.formats.known_formats import FORMATS, fastest_first, table_files
@@ -26,7 +27,7 @@ _NO_RESULTS = {
 """What files are that are taken for results, by their endings."""
 
 
-def load_result(path: str | Path) -> Result:
+def load_result(path: str | Path, *, texts: bool = False) -> Result:
     """A result from a folder or a file; what kind of file it is is seen from what it holds.
 
     Args:
@@ -34,6 +35,8 @@ def load_result(path: str | Path) -> Result:
             or a table by itself: CSV of ours, of fmpy, OpenModelica, Dymola, FMI-LS-REF or a spreadsheet; MATLAB;
             Modelica trajectories (MAT, version 4); NumPy; Parquet; HDF5. Beside ``NAME.csv`` and ``NAME.npy``,
             telegrams are read from ``NAME.events.csv`` where it exists.
+        texts: whether a table may hold columns of texts; they become 1, 2, ... in the order in which they first stand,
+            and ``summary["texts"]`` has them by column.
 
     Returns:
         The result in SI units. ``summary["file"]`` and ``summary["events_recorded"]`` say where a single table came
@@ -54,7 +57,8 @@ def load_result(path: str | Path) -> Result:
     if source.name in table_files().values() and (folder / SUMMARY).is_file():
         return Result.of(read_results(folder, table=source.name))
     try:
-        result = _reader(source)(source)
+        result = _reader(source, texts)(source)
+        _refuse_texts(source, {} if texts else result.summary.get(TEXTS, {}))
         check_time(str(source), result.table["time"])
         return Result.of(_with_events(result, source))
     except OutputError:
@@ -89,7 +93,12 @@ def _holds(folder: Path) -> str:
     return f"It holds: {', '.join(names[:8])}{', ...' if len(names) > 8 else ''}." if names else "It is empty."
 
 
-def _reader(path: Path) -> Callable[[Path], ResultData]:
+def _refuse_texts(source: Path, found: Mapping[str, Sequence[str]]) -> None:
+    for name, texts in found.items():
+        raise OutputError(f"{source}: column {name!r} must hold numbers, got {texts[0]!r}. Leave it out.")
+
+
+def _reader(path: Path, texts: bool) -> Callable[[Path], ResultData]:
     """Who reads a file, by its first bytes."""
     with path.open("rb") as file:
         start = file.read(16)
@@ -108,7 +117,7 @@ def _reader(path: Path) -> Callable[[Path], ResultData]:
             f"{path} is an archive (FMU, spreadsheet, zip or gzip), not a table. Unpack it, or export it as CSV."
         )
     named = [item for item in fastest_first() if item.name != "csv" and path.name.lower().endswith(item.endings)]
-    return named[0].read if named else read_foreign_csv
+    return named[0].read if named else partial(read_foreign_csv, texts=texts)
 
 
 def _with_events(result: ResultData, source: Path) -> ResultData:

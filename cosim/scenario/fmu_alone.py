@@ -120,7 +120,7 @@ def _matches(source: Path, component: Component, where: str) -> tuple[list[str],
     Raises:
         ScenarioError: no column is.
     """
-    columns = [signal.name for signal in load_result(source).signals]
+    columns = [signal.name for signal in load_result(source, texts=True).signals]
     inputs = set(component.names("input"))
     used = [name for name in columns if name in inputs]
     unused = [name for name in columns if name not in inputs]

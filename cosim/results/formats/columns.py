@@ -5,6 +5,8 @@ file.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,6 +18,8 @@ from plant_models.hybrid.units import UnitError, conversion, parse_unit
 
 CHUNK = 1 << 20  # rows looked at at a time
 SHOWN = 8  # names in a message
+TEXTS = "texts"
+"""Key of the summary: what the numbers of columns of texts stand for."""
 
 
 def result_of_columns(
@@ -24,6 +28,7 @@ def result_of_columns(
     columns: Sequence[np.ndarray],
     units: Mapping[str, str | None],
     described: Callable[[str], SignalInfo] = SignalInfo,
+    texts: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> ResultData:
     """A result of columns as a file names them.
 
@@ -33,7 +38,8 @@ def result_of_columns(
             numbers of a data frame) is left out; equal columns of the same name count once.
         columns: arrays of shape (rows,).
         units: of the columns, None where the file says nothing. What can be is converted to SI.
-        described: what else is known of a signal.
+        described: what else is known of a signal. texts: of columns of texts, what their numbers stand for, 1 for the
+            first; kept in the summary.
 
     Raises:
         OutputError: there is no column of time, it goes backwards or holds NaN, or two columns share a name.
@@ -44,9 +50,11 @@ def result_of_columns(
     table = table_of(["time", *order[1:]], [kept[name] for name in order])
     table["time"] *= _seconds(source, units.get(time) or "s")
     check_time(source, table["time"])
-    signals = [_signal(described(name), units.get(name)) for name in order[1:]]
+    signals = [_signal(described(name), units.get(name), name in texts) for name in order[1:]]
     table, signals = in_si(table, signals, lambda name: parse_unit(units.get(name) or "1"))
-    return ResultData(table, signals)
+    return ResultData(
+        table, signals, summary={TEXTS: {name: list(items) for name, items in texts.items()}} if texts else {}
+    )
 
 
 def check_time(source: str, time: np.ndarray) -> None:
@@ -104,7 +112,9 @@ def _seconds(source: str, unit: str) -> float:
         raise OutputError(f"{source}: the unit of time {unit!r} is none ({error}). Write 's'.") from error
 
 
-def _signal(info: SignalInfo, unit: str | None) -> SignalInfo:
+def _signal(info: SignalInfo, unit: str | None, is_text: bool) -> SignalInfo:
+    if is_text:
+        return replace(info, unit="1", variability="discrete")
     if unit is None or unit == info.unit:
         return info
-    return SignalInfo(info.name, unit, info.display_unit, info.variability, info.description)
+    return replace(info, unit=unit)

@@ -54,11 +54,26 @@ def _signal(field: Any) -> SignalInfo:
 
 def _foreign(source: str, table: Any) -> ResultData:
     described = {field.name: _signal(field) for field in table.schema}
-    columns = [_column(source, name, table.column(place)) for place, name in enumerate(table.column_names)]
+    columns, texts = [], dict[str, tuple[str, ...]]()
+    for place, name in enumerate(table.column_names):
+        column, items = _numbered(table.column(place))
+        columns.append(_column(source, name, column))
+        texts |= {name: items} if items else {}
     attributes = json.loads((table.schema.metadata or {}).get(b"PANDAS_ATTRS", b"{}"))
     units = attributes.get("units", {}) if isinstance(attributes, dict) else {}
     known = {n: units.get(n) or (described[n].unit if described[n].unit != "1" else None) for n in table.column_names}
-    return result_of_columns(source, table.column_names, columns, known, lambda name: described[name])
+    return result_of_columns(source, table.column_names, columns, known, lambda name: described[name], texts)
+
+
+def _numbered(column: Any) -> tuple[Any, tuple[str, ...]]:
+    """A column of texts as numbers, in the order in which they first stand, and the texts; another one as it is."""
+    types = _modules()[0].types
+    kind = column.type.value_type if types.is_dictionary(column.type) else column.type
+    if not (types.is_string(kind) or types.is_large_string(kind)):
+        return column, ()
+    texts = column.cast(kind).to_pylist()
+    items = {text: number for number, text in enumerate(dict.fromkeys(t for t in texts if t is not None), start=1)}
+    return _modules()[0].array([items.get(text) for text in texts], _modules()[0].int64()), tuple(items)
 
 
 def _column(source: str, name: str, column: Any) -> np.ndarray:
