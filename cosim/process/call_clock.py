@@ -16,7 +16,7 @@ class CallClock:
     """
 
     def __init__(self, page: LastCall) -> None:
-        self._page, self._seen = page, (0, 0.0)
+        self._page, self._seen = page, (0, b"")
         self.seconds = 0.0
 
     def add(self, elapsed: float) -> None:

@@ -170,13 +170,15 @@ class LastCall:
         size = int.from_bytes(self.memory[NOTE : NOTE + 8], "little")
         return self.memory[NOTE + 8 : NOTE + 8 + size].decode("utf-8", "replace")
 
-    def now(self) -> tuple[int, float]:
-        """Number and time of the present call: while both stay the same it is the same call."""
-        return int(self.call[0]), float(self.time[0])
+    def now(self) -> tuple[int, bytes]:
+        """Number and time of the present call: while both stay the same it is the same call. The time is its eight
+        bytes, since one that is not known is NaN, which equals nothing.
+        """
+        return int(self.call[0]), bytes(self.memory[8:16])
 
     def words(self) -> str:
         """The present call, e.g. ``component 'train' in doStep at t = 3.2 s``; empty where there is none."""
-        number, time = self.now()
+        number, time = int(self.call[0]), float(self.time[0])
         lines = self.memory[TEXTS : TEXTS + self._cells[USED]].decode("utf-8", "replace").split("\n")[:-1]
         if not 0 < number <= len(lines):
             return ""

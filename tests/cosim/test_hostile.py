@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import locale
+import math
 import mmap
 import os
 import signal
@@ -142,6 +143,13 @@ def test_a_call_past_its_limit_ends_the_run_in_words(fmu: Path, tmp_path: Path) 
     assert len(load_result(tmp_path / "out").table) == 25
 
 
+def test_a_call_that_has_no_time_yet_is_limited_too(fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOSTILE_HANGS_WHERE_IT_IS_LOADED", "1")
+    error = reported(start(fmu, tmp_path, "nothing", call_timeout=0.5))
+    assert "component 'bad' in loading its library has not returned for 0.5 s" in error
+    assert "Nothing had been computed yet." in error
+
+
 @pytest.mark.parametrize(("deed", "where"), [("terminated", "terminate"), ("freed", "freeInstance")])
 def test_an_end_that_never_comes_is_limited_and_loses_nothing(fmu: Path, tmp_path: Path, deed: str, where: str) -> None:
     error = reported(start(fmu, tmp_path, f"hangs-when-{deed}", call_timeout=0.5))
@@ -173,8 +181,9 @@ def test_an_error_of_terminate_is_a_warning_of_the_run(fmu: Path) -> None:
     assert "terminate failed: fmi2Terminate failed with status 3 (error)" in warnings[-1]
 
 
-def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As the watch looks: the same call three times 0.2 s, then others, then one that stays."""
+@pytest.mark.parametrize("stays", [0.2, math.nan, math.inf, -0.0])
+def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatch, stays: float) -> None:
+    """As the watch looks: the same call three times 0.2 s, then others, then one that stays, at whatever time."""
     page = LastCall(mmap.mmap(-1, PAGE))
     monkeypatch.setattr(watch, "LAST_CALL", page)
     page.limit(0.5)
@@ -185,7 +194,7 @@ def test_a_limit_is_for_one_call_and_not_for_many(monkeypatch: pytest.MonkeyPatc
         page.call[0], page.time[0] = now
         looking._check_duration(0.2)
     assert ended == []
-    page.call[0] = 1
+    page.call[0], page.time[0] = 1, stays
     for _ in range(4):
         looking._check_duration(0.2)
     assert ended == ["has not returned for 0.5 s, the limit of a call, which call_timeout sets"]

@@ -1,4 +1,5 @@
 /* An integrator, y' = 1, that does harm to the process at the time `at` or at the end of its life; `deed` says what. FMI 2 and 3.
+   A variable of the environment lets it hang where its library is loaded, before anything can be set.
  */
 #define _GNU_SOURCE
 #include "test_fmus.h"
@@ -24,6 +25,12 @@ typedef struct {
 #define END_STATUS(model) ((int)(model)->deed == FAILS_TERMINATED ? fmi2Error : fmi2OK)
 enum { TIME = 0, DEED = 1, AT_TIME = 2, Y = 3 };
 enum { TERMINATED, FREED };
+
+__attribute__((constructor)) static void loaded(void) {
+    if (getenv("HOSTILE_HANGS_WHERE_IT_IS_LOADED") != NULL)
+        for (;;)
+            pause();
+}
 
 static void model_start(Model *m) { m->at = 0.25; }
 
