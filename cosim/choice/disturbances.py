@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 GRAVITY = 9.81  # [m/s2]
-_BRAKES, _PULLS = -0.1, -0.02  # accelerations below and above which a train brakes or pulls [m/s2]
-_MOVES = 2.0  # [m/s]: below this speed no fault is drawn
-_APART = 5.0  # least time between two faults, longer than one of them: twice as long they are still apart [s]
+_BRAKES, _PULLS, _GATHERS = -0.1, -0.02, 0.05  # accelerations: below it brakes, above it pulls, gathers speed [m/s2]
+_MOVES = 1.0  # [m/s]: below this speed no fault is drawn
+_APART = 0.1  # least time between two faults, also where they are twice as long [s]
+_AFTER = 5.0  # for so long after a fault it is named as a cause [s]
 _BELIEVED = 1.8  # most that the error of a resistance is enlarged by, so that a resistance is left
 _MOST = 4  # faults of a kind in a run
 _HARDER = "harder"
@@ -112,7 +113,7 @@ class Disturbance:
             time: [s]. odometer, effort: whether the observer takes them; what it does not take cannot be the cause.
         """
         for fault in self.faults if odometer else ():
-            if fault.onset <= time <= fault.onset + fault.length + _APART:
+            if fault.onset <= time <= fault.onset + fault.length + _AFTER:
                 return f"after a wheel that {'jams' if fault.kind < 0.0 else 'skids'} at {fault.onset:.0f} s"
         for slope in self.slopes if effort else ():
             if slope.onset <= time <= slope.onset + slope.length and self.mass != 1.0:
@@ -126,8 +127,8 @@ def drawn(number: int, seed: int, journey: Journey) -> Disturbance:
 
     Mass is wrong by 5 to 20 %, resistance by 10 to 50 %, the wheel by 0.3 to 1 %; readings have a noise of 0.02 to
     0.1 m/s; slopes go up to 8 per mille; a network loses 5 to 20 % more; wheels jam while the train brakes (depth 0.3
-    to 1) and skid while it pulls (0.1 to 0.5), for 0.5 to 3 s. Signs follow from the number, so that four seeds have
-    both of each.
+    to 1) and skid while it gathers speed (0.1 to 0.5), most often while it is slow, for 0.5 to 3 s. Signs follow from
+    the number, so that four seeds have both of each.
 
     Args:
         number: of the seed, from 1. seed: of the run. journey: of the train.
@@ -167,15 +168,16 @@ def _slopes(rng: np.random.Generator, journey: Journey) -> list[Slope]:
 
 
 def _faults(rng: np.random.Generator, journey: Journey, wanted: float) -> list[OdometerFault]:
-    """Jams while the train brakes, skids while it pulls, in the order of time and apart from each other.
+    """Jams while the train brakes, skids while it gathers speed or, where it never does, pulls; in the order of time.
 
     Args:
         wanted: the kind that gives way to no other where the journey is too short for both.
     """
     moving = np.abs(journey.speed) > _MOVES
     pace = _accelerations(journey)
-    jams = _instants(rng, journey.time[moving & (pace < _BRAKES)], every=15.0)
-    skids = _instants(rng, journey.time[moving & (pace > _PULLS)], every=40.0)
+    pulls, gathers = moving & (pace > _PULLS), moving & (pace > _GATHERS)
+    jams = _instants(rng, journey, moving & (pace < _BRAKES), every=15.0)
+    skids = _instants(rng, journey, gathers if np.any(gathers) else pulls, every=20.0, slow=True)
     every: list[OdometerFault] = []
     for onset, kind in sorted([(t, -1.0) for t in jams] + [(t, 1.0) for t in skids]):
         depth = rng.uniform(0.3, 1.0) if kind < 0.0 else rng.uniform(0.1, 0.5)
@@ -190,7 +192,7 @@ def _apart(faults: Sequence[OdometerFault]) -> list[OdometerFault]:
     """Those that are apart from all before them in this order, in the order of time."""
     found: list[OdometerFault] = []
     for one in faults:
-        if all(a.onset + a.length + _APART < b.onset for a, b in (sorted((one, o), key=_onset) for o in found)):
+        if all(a.onset + 2.0 * a.length + _APART < b.onset for a, b in (sorted((one, o), key=_onset) for o in found)):
             found.append(one)
     return sorted(found, key=_onset)
 
@@ -206,10 +208,19 @@ def _accelerations(journey: Journey) -> np.ndarray:
     return np.asarray(after - before)
 
 
-def _instants(rng: np.random.Generator, times: np.ndarray, every: float) -> list[float]:
-    """Instants drawn from those of the rows [s]; one for each `every` seconds that these take, at least one."""
+def _instants(
+    rng: np.random.Generator, journey: Journey, rows: np.ndarray, every: float, *, slow: bool = False
+) -> list[float]:
+    """Instants drawn from those of some rows [s]: one at least, and at most one for each `every` seconds of them.
+
+    Args:
+        rows: which, shape (rows,). slow: whether they are so much more frequent as the train is slower, since so much
+            more is then the effort of a given power.
+    """
+    times, pace = journey.time[rows], np.abs(journey.speed[rows])
     if not len(times):
         return []
     seconds = len(times) * float(np.median(np.diff(times, append=times[-1] + every)))
-    count = int(np.clip(round(seconds / every), 1, _MOST))
-    return [float(t) for t in rng.choice(times, count)]
+    most = int(np.clip(round(seconds / every), 1, _MOST))
+    weights = 1.0 / pace if slow else np.ones(len(times))
+    return [float(t) for t in rng.choice(times, rng.integers(1, most + 1), p=weights / np.sum(weights))]

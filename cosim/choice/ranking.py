@@ -14,7 +14,7 @@ from fmus.tables.numbers import number
 
 TIE = 0.1
 """Share of the allowance below which two observers do not differ [1]."""
-NEAR, MOST = 1.5, 8
+NEAR, MOST = 1.5, 6
 """Factor of the best up to which another one may still be it, and how many of them run on further seeds."""
 NOTHING = UsedAllowance(inf, 0.0, inf, inf)
 """Of an observer that fails: more than there is."""
@@ -73,6 +73,12 @@ class Row:
         return self.worst[1].share
 
     @property
+    def beyond(self) -> float:
+        """Share of the runs that count in which it leaves the allowance [1]."""
+        lost = [name in self.failures or used.share > 1.0 for name, used in self.used.items()]
+        return sum(lost) / len(lost) if lost else 1.0
+
+    @property
     def safe(self) -> bool:
         """Whether it stays within the allowance in all runs that count."""
         return self.share <= 1.0
@@ -102,8 +108,9 @@ class Row:
         gap = self.score.certificate
         reasons = []
         if gap is not None and not self.certified and isfinite(gap.value):
-            seen = max(g for g in (gap.demand, gap.condition(SEEN_GAP).value, 0.0) if g is not None and g == g)  # noqa: PLR0124 - NaN
-            reasons += [f"its gains are certified for gaps up to {number(gap.value)} s, here are {number(seen)} s"]
+            longer = [g for g in (gap.demand, gap.condition(SEEN_GAP).value) if g is not None and g > gap.value]
+            text = f"its gains are certified for gaps up to {number(gap.value)} s, here are "
+            reasons += [f"{text}{number(max(longer))} s"] if longer else []
         run, used = self.worst
         if self.failures:
             reasons += [next(iter(self.failures.values()))]
@@ -122,19 +129,25 @@ def ranked(rows: Sequence[Row]) -> list[Row]:
     Safe ones come before all others, in the order of their errors; but those that differ by less than `TIE` of the
     allowance are as good: of those whose error is within it of the smallest the ones come first whose share of the
     allowance is within it of the smallest, of these presets that were not made for another train, and of these
-    certified ones. Of unsafe ones those come first that had more runs, for they were safe until then; then the share
-    decides.
+    certified ones. Of unsafe ones those come first that leave the allowance in the smallest share of their runs, or in
+    one run more, which is chance: of these the smallest error is least bad.
 
     Args:
         rows: in any order.
     """
     tried = [row for row in rows if row.tried]
+    beyond = _least_beyond(tried)
     error = min((row.rms for row in tried if row.safe), default=inf) + TIE * allowed(tried)
     share = min((row.share for row in tried if row.safe and row.rms <= error), default=inf) + TIE
 
     def place(row: Row) -> tuple[Any, ...]:
         if not row.safe:
-            return 3, -len(row.used), row.share, row.rms, row.label
+            rare = row.beyond <= beyond and isfinite(row.rms)
+            return (
+                (3, row.rms, row.share, row.label)
+                if rare
+                else (4, not isfinite(row.rms), row.beyond, row.share, row.label)
+            )
         if row.rms > error:
             return 2, row.rms, row.share, row.label
         if row.share > share:
@@ -144,16 +157,23 @@ def ranked(rows: Sequence[Row]) -> list[Row]:
     return [*sorted(tried, key=place), *(row for row in rows if not row.tried)]
 
 
+def _least_beyond(rows: Sequence[Row]) -> float:
+    """Share of the runs in which the best of the unsafe rows leaves the allowance, and one run more [1]."""
+    unsafe = [row for row in rows if not row.safe and isfinite(row.rms)]
+    return min((row.beyond for row in unsafe), default=1.0) + 1.0 / max((len(row.used) for row in unsafe), default=1)
+
+
 def contenders(rows: Sequence[Row]) -> list[Row]:
-    """The rows that may be the best ones, the best first: safe, and not far from it in their error; none where nothing
-    is safe.
+    """The rows that may be the best ones, the best first: safe, and not far from it in their error; where nothing is
+    safe, what leaves the allowance as rarely as the best does.
 
     Args:
         rows: in any order.
     """
     safe = [row for row in ranked(rows) if row.safe]
     if not safe:
-        return []
+        beyond = _least_beyond(rows)
+        return [row for row in ranked(rows) if isfinite(row.rms) and row.beyond <= beyond][:MOST]
     limit = max(NEAR * safe[0].rms, safe[0].rms + TIE * allowed(safe))
     return [row for row in safe if row.rms <= limit][:MOST]
 
