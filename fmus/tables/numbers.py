@@ -26,14 +26,15 @@ def number(value: object, digits: int = 3) -> str:
 
 
 def instant(value: object) -> str:
-    """An instant to the millisecond, as long as a run may be: 1003.25.
+    """An instant to the millisecond, as long as a run may be: 1003.25; one before the first to three digits: 0.00002.
 
     Args:
         value: [s]; None and NaN give a dash.
     """
     if not isinstance(value, int | float) or not math.isfinite(value):
         return number(value)
-    return f"{round(value, 3) + 0.0:.3f}".rstrip("0").rstrip(".")
+    places = 2 - math.floor(math.log10(abs(value))) if 1e-9 <= abs(value) < 1e-3 else 3
+    return f"{round(value, places) + 0.0:.{places}f}".rstrip("0").rstrip(".")
 
 
 def _finite(value: float, digits: int) -> str:
