@@ -175,11 +175,20 @@ def _imported(name: str) -> Any:
     except ModuleNotFoundError as error:
         if not f"{name.partition(':')[0]}.".startswith(f"{error.name}."):  # an import in that module
             raise UserFileError(f"{name} cannot be imported: {explained(error)}") from error
-        raise UserFileError(f"{name}: no module named {error.name!r}; write package.module:Class.") from error
+        raise UserFileError(f"{name}: no module named {error.name!r}; {_where_it_may_be(name)}.") from error
     except AttributeError as error:
         raise UserFileError(f"{name}: {error}") from error
     except Exception as error:
         raise UserFileError(f"{name} cannot be imported: {explained(error)}") from error
+
+
+def _where_it_may_be(name: str) -> str:
+    """What to do about a module that Python does not find."""
+    module, _, cls = name.partition(":")
+    file = Path(*module.split(".")).with_suffix(".py")
+    if not file.is_file():
+        return "write package.module:Class"
+    return f"{file} is here, but Python does not search here: set PYTHONPATH=. or install it, or write {file}:{cls}"
 
 
 def _run(path: Path) -> ModuleType:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -121,7 +122,13 @@ def _input(inspected: InspectedFmu, variable: ModelVariable) -> str:
 def _render(kind: str, **values: Any) -> str:
     """A scenario file as text."""
     files = environment("cosim.starter")
-    filters: dict[str, Any] = {"comment": comment, "guessed": guessed, "one_line": one_line, "python": repr}
+    filters: dict[str, Any] = {
+        "comment": comment,
+        "guessed": guessed,
+        "one_line": one_line,
+        "python": repr,
+        "shell": shlex.quote,
+    }
     files.filters |= filters | {"toml": inline}
     return files.get_template(f"{kind}.toml.j2").render(entry=entry, listing=listing, **values)
 
@@ -188,7 +195,13 @@ def starter(fmu: str | Path, target: str | Path, wishes: StarterWishes = USUAL) 
         kind, values = "train", train(inspected, roles, beside, written, known.radius)
     else:
         kind, values = "alone", alone(inspected)
-    shared = {"inspected": inspected, "fmu": place, "target": target.name, "about": _about(inspected), "listed": LISTED}
+    shared = {
+        "inspected": inspected,
+        "fmu": place,
+        "target": target.name,
+        "about": _about(inspected),
+        "listed": LISTED,
+    }
     text = _render(kind, guesses=kind != "alone", known=known, **shared, **values)
     return Starter(text, kind, [*known.remarks, *_remarks(inspected, kind, roles, observer)])
 

@@ -23,7 +23,11 @@ from fmus.tables.table import Column, Table
 if TYPE_CHECKING:
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
-_MOST_LINES = 8
+MOST_ROWS = 500
+"""Runs whose rows the page of a sweep holds; a row of 20 measures takes a kilobyte."""
+MOST_LINES = 100
+"""Lines of what failed."""
+_MOST_CURVES = 8
 """Combinations of the other values that are drawn as lines."""
 _SPREADS = 4  # components whose spread the verdict says
 _SHOWN = 2  # measures that are drawn at first
@@ -37,8 +41,8 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
     Args:
         result: the runs. directory: where the page will stand, which its links are relative to.
     """
-    (recordings, panels), table = measured_curves(result), _table(result)
-    links, folders = [_link(run, directory) for run in result.runs], [_folder(run, directory) for run in result.runs]
+    (recordings, panels), shown = measured_curves(result), _shown_runs(result)
+    links, folders = [_link(run, directory) for run in shown.runs], [_folder(run, directory) for run in shown.runs]
     click = "see its page" if any(links) else "see how its page is made" if any(folders) else ""
     about = f"What was varied: {', '.join(result.names)}. Drag on an axis to choose runs."
     more = f" Click a run to {click}." if click else " No results of a single run were kept."
@@ -50,11 +54,39 @@ def sweep_page(result: SweepRuns, directory: Path) -> LivePage:
         recordings=recordings,
         panels=panels,
         sections=[
-            Section("Runs", [Rows(table, links, folders)], is_open=True),
-            Section("What failed", [result.troubles()], mood="bad"),
+            Section("Runs", [*_left_out(result, shown), Rows(_table(shown), links, folders)], is_open=True),
+            Section("What failed", [_first_lines(result.troubles())], mood="bad"),
             *_warnings(result),
         ],
     )
+
+
+def _shown_runs(result: SweepRuns) -> SweepRuns:
+    """The runs whose rows the page holds, in their order: of many those that failed or are not as expected, then those
+    with the largest size of the measure that the page speaks of first.
+    """
+    if len(result) <= MOST_ROWS:
+        return result
+    column = _measure(result)
+    sizes = {run.number: abs(value) for run, value in _known(result, column.key)} if column is not None else {}
+    first = sorted(result.runs, key=lambda run: (run.ending == "done", -sizes.get(run.number, np.inf)))[:MOST_ROWS]
+    return replace(result, runs=sorted(first, key=lambda run: run.number))
+
+
+def _left_out(result: SweepRuns, shown: SweepRuns) -> list[str]:
+    """Which rows the page does not hold, in a sentence; nothing where it holds all."""
+    if len(shown) == len(result):
+        return []
+    column = _measure(result)
+    largest = f", then those with the largest {column.heading}" if column is not None else ""
+    count = f"{len(shown)} of {len(result)} runs"
+    return [f"{count}: those that failed or are not as expected{largest}. All stand in index.csv."]
+
+
+def _first_lines(lines: list[str]) -> list[str]:
+    """The first lines of what failed, and how many more there are."""
+    left = len(lines) - MOST_LINES
+    return lines if left <= 0 else [*lines[:MOST_LINES], f"and {left} more, see the column failure of index.csv"]
 
 
 def _warnings(result: SweepRuns) -> list[Section]:
@@ -204,7 +236,7 @@ def _recordings(result: SweepRuns) -> list[PageRecording]:
     for run in result.runs:
         others = [f"{n} = {setting_text(run.settings.get(n))}" for n in result.names if n != against]
         groups.setdefault(", ".join(others) or "all runs", []).append(run)
-    if len(groups) > _MOST_LINES:
+    if len(groups) > _MOST_CURVES:
         return []
     return [_line(result, against, label, runs) for label, runs in groups.items()]
 

@@ -159,10 +159,11 @@ class SweepRuns(FirstScreen):
 
     def table(self) -> list[dict[str, Any]]:
         """One row for each run: ``run``, the settings, the measures (NaN where a run has none) and ``failure``."""
+        measures = self.measures
         return [
             {"run": run.number}
             | {name: run.settings.get(name) for name in self.names}
-            | {name: run.measures.get(name, nan) for name in self.measures}
+            | {name: run.measures.get(name, nan) for name in measures}
             | {"failure": run.failure}
             for run in self.runs
         ]

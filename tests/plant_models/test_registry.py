@@ -152,6 +152,16 @@ def test_a_users_file_that_is_wrong_is_reported_without_traceback(
         raise AssertionError(said.replace("\n", " "))
 
 
+def test_a_module_that_lies_here_and_is_not_searched_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A command does not search the folder that it is typed in, other than ``python`` does."""
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "filters.py").write_text("class Bias:\n    step = print\n")
+    monkeypatch.chdir(tmp_path)
+    words = "no module named 'mine'; mine/filters.py is here, but .* set PYTHONPATH=. or .* mine/filters.py:Bias"
+    with pytest.raises(UserFileError, match=words):
+        load_class("mine.filters:Bias", EXPECTED)
+
+
 def test_a_missing_import_of_a_users_module_is_not_taken_for_a_missing_module(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -32,6 +32,9 @@ def test_what_is_written_runs_from_the_command_line(
     )
     assert main(["new", "point.fmu", "--force", "--observer", "discrete_uio"]) == 0
     assert 'observer = "discrete_uio"' in Path("point.toml").read_text()
+    assert main(["new", "point.fmu", "-o", "Zug & Öl.toml"]) == 0
+    assert "then: cosim run 'Zug & Öl.toml'" in capsys.readouterr().out
+    assert "#   cosim show 'Zug & Öl.toml' " in Path("Zug & Öl.toml").read_text()
 
 
 def test_a_mistake_ends_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,9 +13,11 @@ from small_scenarios import small
 
 from cosim import Scenario
 from cosim.cli import main
+from cosim.report.live.live_page import LivePage, Rows
 from cosim.runs.journal import JOURNAL
 from cosim.studies.live_sweep import sweep_page
 from cosim.studies.seed_runs import seed_study
+from cosim.studies.sweep_files import write_index
 from cosim.studies.sweep_runs import SweepRun, SweepRuns
 from cosim.studies.warnings_of_runs import shared_warnings, warning_lines
 
@@ -28,6 +30,9 @@ def plant() -> Scenario:
     scenario = Scenario(stop=0.2, step=0.01)
     scenario.add("train", model="locomotive", **{"as": "block3"}, parameters={"train_speed": 10.0, "effort": 5e4})
     return scenario
+
+
+PLANT = plant()
 
 
 @pytest.mark.parametrize("kept", [[], ["--table-only"]])
@@ -106,3 +111,46 @@ def test_where_no_measure_differs_none_is_called_the_largest(tmp_path: Path) -> 
     runs = [SweepRun(n, {"train.mass": 1e3 * n}, measures={"same": 0.1}) for n in range(3)]
     page = sweep_page(SweepRuns(plant(), ["train.mass"], runs), tmp_path)
     assert page.finding == "No measure differs between the runs: what is varied changes none of them."
+
+
+def rows_of(page: LivePage) -> tuple[list[int], list[str]]:
+    """Numbers of the runs in the table of a sweep's page, and what is said above it."""
+    parts = next(section for section in page.sections if section.title == "Runs").parts
+    table = next(part.table for part in parts if isinstance(part, Rows))
+    return [row[0] for row in table.rows], [part for part in parts if isinstance(part, str)]
+
+
+@given(st.lists(st.one_of(st.none(), st.floats(-1e9, 1e9)), max_size=12), st.integers(1, 6))
+def test_a_page_keeps_the_worst_of_many_runs(values: list[float | None], most: int) -> None:
+    """In their order: what failed comes first, then the largest; what is left out is said, and nothing else."""
+    runs = [
+        SweepRun(n, {"train.mass": 1e3 * n}, failure="no", measures={})
+        if value is None
+        else SweepRun(n, {"train.mass": 1e3 * n}, measures={"way": value})
+        for n, value in enumerate(values)
+    ]
+    result = SweepRuns(PLANT, ["train.mass"], runs)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("cosim.studies.live_sweep.MOST_ROWS", most)
+        shown, said = rows_of(sweep_page(result, Path()))
+    assert shown == sorted(shown)
+    assert len(shown) == min(most, len(runs))
+    rank = [float("inf") if value is None else abs(value) for value in values]
+    assert sorted((rank[n] for n in shown), reverse=True) == sorted(rank, reverse=True)[: len(shown)]
+    assert [text.partition(" runs")[0] for text in said] == [f"{most} of {len(runs)}"] * (len(runs) > most)
+
+
+def test_thousands_of_runs_make_no_large_page(tmp_path: Path) -> None:
+    """All of them stand in the table; of many failures the first are named."""
+    names = [f"observer_{k}.speed_error_rms" for k in range(20)]
+    runs = [
+        SweepRun(
+            n, {"train.mass": 1e3 + n}, failure=None if n % 4 else "it failed", measures=dict.fromkeys(names, 0.1 + n)
+        )
+        for n in range(3000)
+    ]
+    paths = write_index(SweepRuns(PLANT, ["train.mass"], runs), tmp_path)
+    assert paths["page"].stat().st_size < 1e6
+    assert "500 of 3000 runs" in paths["page"].read_text()
+    assert "and 650 more, see the column failure of index.csv" in paths["page"].read_text()
+    assert len(paths["csv"].read_text().splitlines()) == 3001
