@@ -336,7 +336,8 @@ class Component(_DifferentiableComponent):
         )
 
     def guard(self, what: str, call: Callable[..., Any], *arguments: Any) -> Any:  # noqa: D102 - see Instance
-        before = None if self._running else Surroundings()  # those of its steps are compared elsewhere
+        # those of its steps are compared elsewhere; values are set often
+        before = None if self._running else Surroundings(whole=not what.startswith("setting"))
         number = self._call_numbers.get(what) or self._number_of(what)
         LAST_CALL.call[0], LAST_CALL.time[0] = number, self.time
         try:

@@ -36,7 +36,7 @@ from cosim.run.summary import evaluated_summary, run_summary
 from cosim.run.values_not_taken import values_not_taken
 from cosim.structure.divergence import explained_failure
 from fmu_observer.annotated_variable import declared_warnings
-from fmus.fmi.surroundings import SurroundingsOfSteps
+from fmus.fmi.surroundings import SurroundingsOfSteps, is_left
 from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.signal import OutputWarning
 
@@ -166,12 +166,14 @@ def _trespasses(components: Mapping[str, Component], in_steps: Set[str]) -> Iter
     """What was changed for everybody in this process, and put back."""
     for name, component in components.items():
         for changed, call in component.trespasses.items():
-            yield f"{name}: {call} changed {changed} of the whole program; it was put back."
+            then = "that was left so" if is_left(changed) else "it was put back"
+            yield f"{name}: {call} changed {changed} of the whole program; {then}."
     native = [name for name, component in components.items() if component.kind == "FMU"]
     for changed in sorted(in_steps):
+        then = "that was left so" if is_left(changed) else "it was put back, but not after every step"
         yield (
-            f"{' or '.join(native)}: its steps change {changed} of the whole program; it was put back, but not after "
-            "every step: other components, and their numbers, may have been touched."
+            f"{' or '.join(native)}: its steps change {changed} of the whole program; {then}: other components, and "
+            "their numbers, may have been touched."
         )
 
 

@@ -17,7 +17,7 @@ from fmus.check.checked_instance import FmuInstance, FmuSlave, make_slave
 from fmus.check.exchange_model import FmuModel, make_model
 from fmus.check.runner import Runner
 from fmus.fmi.standard import MODEL_EXCHANGE
-from fmus.fmi.surroundings import Surroundings
+from fmus.fmi.surroundings import Surroundings, open_files
 
 SHARE_OF_BUDGET = 0.3
 """Of the time of a check, for finding inputs that move something."""
@@ -50,7 +50,8 @@ class Context:
         steps: of the longest run.
         ends: whether instances are terminated and freed. announce: called with the name of each call that ends one,
             and with nothing after it.
-        surroundings, directory: of the process, before anything of the FMU runs; `entries` are those of the directory.
+        surroundings, directory, open_files: of the process, before anything of the FMU runs; `entries` are those of
+            the directory.
     """
 
     folder: Path
@@ -64,6 +65,7 @@ class Context:
     announce: Callable[[str], None] = _unnoted
     surroundings: Surroundings = field(default_factory=Surroundings)
     directory: Path = field(default_factory=Path.cwd)
+    open_files: Mapping[int, tuple[int, int]] = field(default_factory=open_files)
 
     def __post_init__(self) -> None:
         self.entries = {entry.name for entry in self.directory.iterdir()}

@@ -26,7 +26,7 @@ from fmus.check.check import END
 from fmus.check.findings import CheckFinding, Verdict
 from fmus.check.job import CheckJob
 from fmus.check.known_checks import CHECKS
-from fmus.check.worker import unrun
+from fmus.check.worker import FILES_CLOSED, unrun
 
 _START_LIMIT = 60.0
 """Time a child may take to start before its first check [s]; a loaded machine takes seconds."""
@@ -219,6 +219,8 @@ def _ending(message: dict[str, Any]) -> str:
         except ValueError:
             name = "unknown"
         return f"crashed with signal {-code} ({name})"
+    if code == FILES_CLOSED:
+        return "ended the check: it closed files of the process that it had not opened,"
     return f"ended the process with exit code {code}"
 
 

@@ -24,6 +24,8 @@ from fmus.check.known_checks import CHECKS, EXPECTED
 from fmus.fmi.description import read_description
 from plant_models.user_file import UserFileError, load_class
 
+FILES_CLOSED = 97
+"""Exit code of a worker that cannot report any more, because the FMU has closed files that it did not open."""
 BY_HAND = "check this by hand"
 DIFFERS = "not run, because equal runs differ"
 _MAX_FILE_BYTES = 256 * 1024**2
@@ -42,8 +44,11 @@ def main() -> NoReturn:
     def report(message: dict[str, Any]) -> None:
         if os.getpid() != me:
             os._exit(0)  # the FMU has forked: a copy of the worker, which must report nothing
-        lines.write(json.dumps(message) + "\n")
-        lines.flush()
+        try:
+            lines.write(json.dumps(message) + "\n")
+            lines.flush()
+        except OSError:
+            os._exit(FILES_CLOSED)
 
     run(job, report)
     lines.close()

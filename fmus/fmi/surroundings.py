@@ -1,5 +1,7 @@
-"""Surroundings: what an FMU may change for everybody in its process is put back: the working directory, the rounding of
-numbers, the locale, the response to Ctrl-C and the standard streams.
+"""Surroundings: what an FMU may change for everybody in its process is noticed, and put back where it may be: the
+working directory, the rounding of numbers, the locale, the response to Ctrl-C, limits of the process, the permissions
+of new files and the standard streams. Environment variables and the response to other signals are left as they are: the
+FMU may need them, as a virtual machine in it does.
 
 An FMU that leaves another rounding mode behind changes the last digits of every other component, and of Python itself.
 """
@@ -8,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import locale
+import math
 import os
 import platform
 import signal
@@ -15,29 +18,36 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
+from types import ModuleType
 from typing import Any, NamedTuple
+
+resource: ModuleType | None = None
+with suppress(ImportError):  # exists on POSIX systems only
+    import resource
 
 FLOATS = "the rounding of floating-point numbers"
 PLACE = "the working directory"
-_LOCALE = "the locale"
-_INTERRUPT = "the response to Ctrl-C"
 _STREAMS = "the standard streams"
+_SIGNALS, _VARIABLES = "the response to", "the environment variables"
 ENVIRONMENT_BYTES = 256  # more than any fenv_t
 MXCSR_AT, _MXCSR_MODES = 28, 0xFFC0  # in glibc's fenv_t of x86-64: rounding, masks, flush to zero, denormals are zero
 EVERY = 64
+_MOST_NAMED = 5
 _ACTION_WORDS = 32  # more than any struct sigaction
 _SIGINT = int(signal.SIGINT)
-_OUTPUTS = (1, 2)
+_STANDARD = (0, 1, 2)
 
 
 class _Aspect(NamedTuple):
     """One thing that is everybody's.
 
     Attributes:
-        name: in words. read: how it is; None where that cannot be asked. put_back: makes it so again.
+        change: what became of it, in words, of how it was and how it is; empty where it is as it was.
+        read: how it is; None where that cannot be asked.
+        put_back: makes it so again.
     """
 
-    name: str
+    change: Callable[[Any, Any], str]
     read: Callable[[], Any]
     put_back: Callable[[Any], object]
 
@@ -46,10 +56,14 @@ class Surroundings:
     """How things are when this is made.
 
     `put_back` puts them back so, and says what was changed.
+
+    Args:
+        whole: also what takes long to read, as long as a small step.
     """
 
-    def __init__(self) -> None:
-        self._before = [(aspect, aspect.read()) for aspect in _ASPECTS]
+    def __init__(self, *, whole: bool = True) -> None:
+        aspects = _ASPECTS + _LONG_ASPECTS if whole else _ASPECTS
+        self._before = [(aspect, aspect.read()) for aspect in aspects]
         self._floats = _floats()
         self._saved = ctypes.create_string_buffer(ENVIRONMENT_BYTES)
         if self._floats is not None:
@@ -60,10 +74,11 @@ class Surroundings:
         """What has been changed since, in words, and is now as it was."""
         changed = []
         for aspect, before in self._before:
-            if before is not None and aspect.read() != before:
+            change = aspect.change(before, aspect.read()) if before is not None else ""
+            if change:
                 with suppress(OSError, ValueError, locale.Error):
                     aspect.put_back(before)
-                changed.append(aspect.name)
+                changed.append(change)
         if _floats() != self._floats:
             _library().fesetenv(self._saved)
             changed.append(FLOATS)
@@ -79,7 +94,7 @@ class SurroundingsOfSteps:
     def __init__(self) -> None:
         self.changed: set[str] = set()
         self._calls = 0
-        self._before = Surroundings()
+        self._before, self._whole = Surroundings(whole=False), Surroundings()
 
     def compare(self) -> None:
         """After the first steps, and after every `EVERY`-th call."""
@@ -89,15 +104,15 @@ class SurroundingsOfSteps:
 
     def finish(self) -> set[str]:
         """Put back what the last steps changed; everything that was changed."""
-        self.changed |= set(self._before.put_back())
+        self.changed |= set(self._before.put_back()) | set(self._whole.put_back())
         return self.changed
 
 
 class _Streams:
-    """The standard output and error stream, kept open under other numbers for as long as this lives."""
+    """The standard streams, kept open under other numbers for as long as this lives."""
 
     def __init__(self) -> None:
-        self._kept = {number: os.dup(number) for number in _OUTPUTS if _file(number) is not None}
+        self._kept = {number: os.dup(number) for number in _STANDARD if _file(number) is not None}
 
     def put_back(self) -> list[str]:
         changed = [number for number, kept in self._kept.items() if _file(number) != _file(kept)]
@@ -109,6 +124,14 @@ class _Streams:
         for kept in self._kept.values():
             with suppress(OSError):
                 os.close(kept)
+
+
+def open_files() -> dict[int, tuple[int, int]]:
+    """The files that are open in this process, by number; empty where that is not known."""
+    with suppress(OSError):
+        numbers = map(int, os.listdir("/dev/fd"))  # noqa: PTH208 - names are enough; one is that of the list itself
+        return {number: file for number in numbers if (file := _file(number)) is not None}
+    return {}
 
 
 def _file(number: int) -> tuple[int, int] | None:
@@ -155,11 +178,98 @@ def _respond(response: _Response) -> None:
     _library().sigaction(_SIGINT, response.action, None)
 
 
+def _handlers() -> dict[int, int] | None:
+    """The address of what is done at each other signal, by its number."""
+    library, found = _library(), {}
+    if os.name != "posix" or library is None:
+        return None
+    for number in range(1, signal.SIGSYS + 1):
+        if number != _SIGINT and library.sigaction(number, None, _action) == 0:
+            found[number] = _action[0] or 0
+    return found
+
+
+def _other_handlers(before: dict[int, int], now: dict[int, int]) -> str:
+    names = [signal.Signals(number).name for number, handler in now.items() if before.get(number) != handler]
+    return f"{_SIGNALS} {', '.join(names)}" if names else ""
+
+
+def _variables() -> set[bytes] | None:
+    """The environment as C has it, of which Python keeps a copy of its own."""
+    if os.name != "posix" or _library() is None:
+        return None
+    block, found, place = ctypes.POINTER(ctypes.c_char_p).in_dll(_library(), "environ"), set(), 0
+    while block and (text := block[place]) is not None:
+        found.add(text)
+        place += 1
+    return found
+
+
+def _other_variables(before: set[bytes], now: set[bytes]) -> str:
+    names = sorted({text.partition(b"=")[0].decode(errors="replace") for text in before ^ now})
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return f"{_VARIABLES} {', '.join(names[:_MOST_NAMED])}{more}" if names else ""
+
+
+def _limits() -> dict[int, tuple[float, float]] | None:
+    """Soft and hard limits of the process."""
+    if resource is None:
+        return None
+    infinite = {resource.RLIM_INFINITY: math.inf}
+    return {n: tuple(infinite.get(x, x) for x in resource.getrlimit(n)) for n in _RESOURCES}  # type: ignore[misc]
+
+
+def _lower_limits(before: dict[int, tuple[float, float]], now: dict[int, tuple[float, float]]) -> str:
+    lower = [_RESOURCES[n] for n, (soft, hard) in now.items() if soft < before[n][0] or hard < before[n][1]]
+    return f"the limits {', '.join(lower)}" if lower else ""
+
+
+def _raise_limits(before: dict[int, tuple[float, float]]) -> None:
+    assert resource is not None
+    infinite = {math.inf: resource.RLIM_INFINITY}
+    for number, (soft, hard) in before.items():
+        with suppress(OSError, ValueError):
+            resource.setrlimit(number, (infinite.get(soft, soft), infinite.get(hard, hard)))  # type: ignore[arg-type]
+
+
+def _mask() -> int:
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
+
+
+def _as_it_was(name: str) -> Callable[[Any, Any], str]:
+    return lambda before, now: "" if before == now else name
+
+
+def _nothing(_before: Any) -> None:
+    """It is left as it is."""
+
+
+def is_left(change: str) -> bool:
+    """Whether what was changed is left so.
+
+    Args:
+        change: as `Surroundings.put_back` says it.
+    """
+    return change.startswith((_SIGNALS, _VARIABLES)) and change != _INTERRUPT
+
+
+_INTERRUPT = f"{_SIGNALS} Ctrl-C"
 _ASPECTS = (
-    _Aspect(PLACE, _here, os.chdir),
-    _Aspect(_LOCALE, lambda: locale.setlocale(locale.LC_ALL), _speak),
-    _Aspect(_INTERRUPT, _response, _respond),
+    _Aspect(_as_it_was(PLACE), _here, os.chdir),
+    _Aspect(_as_it_was("the locale"), lambda: locale.setlocale(locale.LC_ALL), _speak),
+    _Aspect(_as_it_was(_INTERRUPT), _response, _respond),
+    _Aspect(_as_it_was("the permissions of new files"), _mask, os.umask),
 )
+_LONG_ASPECTS = (
+    _Aspect(_other_handlers, _handlers, _nothing),
+    _Aspect(_other_variables, _variables, _nothing),
+    _Aspect(_lower_limits, _limits, _raise_limits),
+)
+_action = (ctypes.c_void_p * _ACTION_WORDS)()
+_NAMED = (name for name in dir(resource) if name.startswith("RLIMIT_") and name != "RLIMIT_OFILE")
+_RESOURCES: dict[int, str] = {getattr(resource, name): name for name in _NAMED}
 
 
 @cache

@@ -310,6 +310,8 @@ def test_words_run_out_without_harm(tmp_path: Path) -> None:
         ("closes", "the standard streams"),
         ("deafens", "the response to Ctrl-C"),
         ("localises", "the locale"),
+        ("lowers-limits", "the limits RLIMIT_NOFILE"),
+        ("masks", "the permissions of new files"),
     ],
 )
 @pytest.mark.parametrize("stepper", ["python", "compiled"])
@@ -325,6 +327,18 @@ def test_what_an_fmu_changes_for_all_is_put_back_and_reported(
     assert 0.1 + 0.2 == 0.30000000000000004 and -0.1 - 0.2 == -0.30000000000000004  # noqa: PT018 - rounded to nearest
     warnings = load_result(tmp_path / "out").summary["warnings"]
     assert [w for w in warnings if w.startswith(f"bad: its steps change {what}")]
+
+
+@pytest.mark.parametrize(
+    ("deed", "what"),
+    [("sets-variable", "the environment variables TEST_FMUS_HOSTILE"), ("handles", "the response to SIGUSR2")],
+)
+def test_what_it_may_need_itself_is_reported_and_left(fmu: Path, tmp_path: Path, deed: str, what: str) -> None:
+    """By the command as a user runs it: what is left would be left in this process."""
+    command = [sys.executable, "-m", "cosim.cli", "run", saved(fmu, tmp_path, deed), "--out", "out", "--verbose"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    words = f"bad: its steps change {what} of the whole program; that was left so"
+    assert words in " ".join(done.stderr.split())
 
 
 @pytest.mark.parametrize("stepper", ["python", "compiled"])

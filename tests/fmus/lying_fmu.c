@@ -2,12 +2,22 @@
  *
  * A counted event `pulse` raises the speed by one at its stamp. The tests of `fmus check` compile it once for each lie.
  */
+#define _GNU_SOURCE
+#include <fenv.h>
+#include <locale.h>
 #include <math.h>
+#include <pthread.h>
+#include <signal.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
+#if defined LIE_FLUSHES
+#include <xmmintrin.h>
+#endif
 
 #include "fmi2Functions.h"
 
@@ -140,7 +150,9 @@ void fmi2FreeInstance(fmi2Component c) {
 #ifdef LIE_CRASH_FREED
     *(volatile int *)(size_t)8 = 1;
 #endif
+#ifndef LIE_THREAD /* which may still write */
     free(c);
+#endif
 }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real tol, fmi2Real start, fmi2Boolean sd, fmi2Real stop) {
     DATA(c).time = start;
@@ -268,6 +280,75 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
     return fmi2OK;
 }
 
+/* -- harm to the process, in each step --------------------------------------------------------------------------------- */
+
+static void handle(int number) { (void)number; }
+
+static void *write_later(void *instance) {
+    usleep(5000);
+    DATA(instance).value[SPEED] += 1e-3;
+    return NULL;
+}
+
+static void do_harm(Instance *instance) {
+    (void)instance;
+#ifdef LIE_MOVES
+    if (chdir("/") != 0)
+        abort();
+#endif
+#ifdef LIE_ROUNDS
+    fesetround(FE_UPWARD);
+#endif
+#ifdef LIE_FLUSHES
+    _mm_setcsr(_mm_getcsr() | 0x8040);
+#endif
+#ifdef LIE_LOCALISES
+    setlocale(LC_ALL, "C");
+#endif
+#ifdef LIE_IGNORES_INTERRUPTS
+    signal(SIGINT, SIG_IGN);
+#endif
+#ifdef LIE_HANDLES_SIGNALS
+    signal(SIGTERM, handle);
+#endif
+#ifdef LIE_LOWERS_LIMITS
+    struct rlimit limit;
+    getrlimit(RLIMIT_NOFILE, &limit);
+    limit.rlim_cur = 100;
+    setrlimit(RLIMIT_NOFILE, &limit);
+#endif
+#ifdef LIE_SETS_ENVIRONMENT
+    setenv("LIAR_HOME", "/tmp", 1);
+#endif
+#ifdef LIE_FORGETS_ENVIRONMENT
+    unsetenv("HOME");
+#endif
+#ifdef LIE_CLOSES_OUTPUT
+    close(1);
+#endif
+#ifdef LIE_CLOSES_INPUT
+    close(0);
+#endif
+#ifdef LIE_CLOSES_ALL
+    for (int i = 3; i < 256; i++)
+        close(i);
+#endif
+#ifdef LIE_MASKS
+    umask(0777);
+#endif
+#ifdef LIE_LEAKS_STEPS
+    memset(malloc(100000000), 1, 100000000);
+#endif
+#ifdef LIE_LEAKS_QUIETLY
+    ((char *)malloc(100000000))[0] = 1;
+#endif
+#ifdef LIE_THREAD
+    pthread_t thread;
+    if (pthread_create(&thread, NULL, write_later, instance) == 0)
+        pthread_detach(thread);
+#endif
+}
+
 /* -- co-simulation ------------------------------------------------------------------------------------------------- */
 
 #define STEP 0.01
@@ -298,10 +379,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
     fprintf(file, "%g\n", t);
     fclose(file);
 #endif
-#ifdef LIE_MOVES
-    if (chdir("/") != 0)
-        return fmi2Error;
-#endif
+    do_harm(instance);
 #ifdef LIE_FIRST_STEP_LOST
     if (instance->data.time < 1e-9) {
         instance->data.time = t + h;

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-import sys
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
@@ -14,6 +13,7 @@ from fmus.check.checks.life_checks import SHARE_OF_BUDGET, compared
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, failed, passed, skipped
 from fmus.check.runner import WARM_UP_STEPS, elsewhere, end_of_experiment
+from fmus.fmi.surroundings import open_files
 
 _INSTANCES = 50
 _FIRST_INSTANCES = 10
@@ -26,27 +26,24 @@ _LEAK = 16 * 1024
 # -- what the process holds ------------------------------------------------------------------------------------------
 
 
-def _resident_bytes() -> int | None:
-    """Memory of this process in main memory [bytes], or None where that is not known."""
+def memory_bytes() -> tuple[int, int] | None:
+    """Memory of this process, reserved and in use [bytes], or None where that is not known."""
     gc.collect()
     with suppress(OSError, ValueError):
-        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        pages = Path("/proc/self/statm").read_text(encoding="ascii").split()
+        return int(pages[0]) * os.sysconf("SC_PAGE_SIZE"), int(pages[1]) * os.sysconf("SC_PAGE_SIZE")
     return None
 
 
-def open_files() -> int | None:
-    """How many files are open in this process, or None where that is not known."""
-    if sys.platform == "win32":
-        return None
-    with suppress(OSError):
-        return len(os.listdir("/dev/fd"))  # noqa: PTH208 - names are enough
-    return None
+def _mark(count: int) -> tuple[int, int | None, int]:
+    memory = memory_bytes()
+    return count, None if memory is None else memory[1], len(open_files())
 
 
-def _growth(first: tuple[int, int | None, int | None], last: tuple[int, int | None, int | None]) -> CheckOutcome:
+def _growth(first: tuple[int, int | None, int], last: tuple[int, int | None, int]) -> CheckOutcome:
     count = last[0] - first[0]
     said = []
-    if first[2] is None or last[2] is None:
+    if not first[2]:
         said.append("open files are not counted on this system")
     elif last[2] > first[2]:
         return failed(f"leaks file descriptors: {last[2] - first[2]} more are open after {count} more instances")
@@ -107,9 +104,9 @@ class RepeatedInstantiationCheck(
                 slave.exit_initialization()
                 slave.free_instance_only()
                 if count in (_FIRST_INSTANCES, _INSTANCES):
-                    marks.append((count, _resident_bytes(), open_files()))
+                    marks.append(_mark(count))
                 elif perf_counter() - since > SHARE_OF_BUDGET * context.budget and count > _FIRST_INSTANCES:
-                    marks.append((count, _resident_bytes(), open_files()))
+                    marks.append(_mark(count))
                     break
         finally:
             slave.free()

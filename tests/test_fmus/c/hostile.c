@@ -7,11 +7,14 @@
 #include <fenv.h>
 #include <locale.h>
 #include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 enum {
     NOTHING, EXITS, EXITS_AT_ONCE, CRASHES, HANGS, CRASHES_FREED, CRASHES_TERMINATED, EXITS_FREED, MOVES, ROUNDS, PAINTS, INTERRUPTS,
     BOUNDS, OVERWRITES, WARNS, HANGS_FREED, HANGS_TERMINATED, FAILS_TERMINATED, CLOSES, DEAFENS, LOCALISES,
+    SETS_VARIABLE, HANDLES, LOWERS_LIMITS, MASKS,
 };
 #define BOUND 0.3 /* of BOUNDS: `at` is no later */
 
@@ -58,6 +61,13 @@ static void leave(int event, const Model *m) {
         exit(0);
 }
 
+static void lower_limit(void) {
+    struct rlimit limit;
+    getrlimit(RLIMIT_NOFILE, &limit);
+    limit.rlim_cur = 200;
+    setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 static void do_harm(Host *host, int deed) {
     switch (deed) {
     case EXITS: exit(0);
@@ -70,6 +80,10 @@ static void do_harm(Host *host, int deed) {
     case CLOSES: close(1); break;
     case DEAFENS: signal(SIGINT, SIG_IGN); break;
     case LOCALISES: setlocale(LC_ALL, "C"); break;
+    case SETS_VARIABLE: setenv("TEST_FMUS_HOSTILE", "1", 1); break;
+    case HANDLES: signal(SIGUSR2, SIG_IGN); break;
+    case LOWERS_LIMITS: lower_limit(); break;
+    case MASKS: umask(0777); break;
     case INTERRUPTS: kill(getpid(), SIGINT); break;
     default: break;
     }
