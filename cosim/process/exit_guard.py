@@ -66,10 +66,10 @@ def limited_calls(seconds: float | None, *, ends: bool = False) -> Iterator[None
     code 2. Afterwards the limit of before holds.
 
     Args:
-        seconds: longest time a call may take [s]; None for any. ends: these are calls that end FMUs, before which
-            everything was written: where another process keeps the time, None stands for half a minute.
+        seconds: longest time a call may take [s]; None for any.
+        ends: these are calls that end FMUs, before which everything was written: None stands for half a minute.
     """
-    seconds = _ENDING if seconds is None and ends and LAST_CALL.timed else seconds
+    seconds = _ENDING if seconds is None and ends else seconds
     before, over = LAST_CALL.seconds_at_most, threading.Event()
     LAST_CALL.limit(seconds)
     if seconds is not None and not LAST_CALL.timed and not before:  # else somebody keeps the time already

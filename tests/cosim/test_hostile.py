@@ -158,9 +158,7 @@ def test_an_end_that_never_comes_is_limited_and_loses_nothing(fmu: Path, tmp_pat
     assert len(load_result(tmp_path / "out").table) == 51
 
 
-def test_without_a_limit_of_calls_only_ends_have_one_where_somebody_keeps_the_time(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_without_a_limit_of_calls_only_ends_have_one_whoever_keeps_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
     page = LastCall(mmap.mmap(-1, PAGE))
     monkeypatch.setattr(exit_guard, "LAST_CALL", page)
     seen: list[float] = []
@@ -169,8 +167,19 @@ def test_without_a_limit_of_calls_only_ends_have_one_where_somebody_keeps_the_ti
             with exit_guard.limited_calls(None):
                 seen.append(page.seconds_at_most)
             seen.append(page.seconds_at_most)
-    assert seen == [0.0, 30.0, 0.0, 0.0]
+    assert seen == [0.0, 30.0, 0.0, 30.0]
     assert page.seconds_at_most == 0.0
+
+
+def test_an_end_that_never_comes_ends_a_script_in_words_and_keeps_what_was_streamed(fmu: Path, tmp_path: Path) -> None:
+    script = (
+        "from cosim import Scenario; from cosim.process import exit_guard; exit_guard._ENDING = 0.3; "
+        f"Scenario.load({saved(fmu, tmp_path, 'hangs-when-freed')!r}).run(stream='out')"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=60.0)
+    assert done.returncode == 2
+    assert "component 'bad' in freeInstance at t = 0.5 s has not returned for 0.3 s" in done.stderr
+    assert len(load_result(tmp_path / "out").table) == 51
 
 
 def test_an_error_of_terminate_is_a_warning_of_the_run(fmu: Path) -> None:
