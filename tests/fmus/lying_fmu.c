@@ -305,8 +305,8 @@ static void do_harm(Instance *instance) {
 #ifdef LIE_LOCALISES
     setlocale(LC_ALL, "C");
 #endif
-#ifdef LIE_IGNORES_INTERRUPTS
-    signal(SIGINT, SIG_IGN);
+#ifdef LIE_TAKES_INTERRUPTS
+    signal(SIGINT, handle);
 #endif
 #ifdef LIE_HANDLES_SIGNALS
     signal(SIGTERM, handle);

@@ -73,7 +73,7 @@ def test_the_honest_one_passes_clean(tmp_path: Path) -> None:
         ("MOVES", "surroundings", LIMIT, "it changed the working directory"),
         ("ROUNDS", "surroundings", LIMIT, "it changed the rounding of floating-point numbers"),
         ("LOCALISES", "surroundings", LIMIT, "it changed the locale"),
-        ("IGNORES_INTERRUPTS", "surroundings", LIMIT, "it changed the response to Ctrl-C"),
+        ("TAKES_INTERRUPTS", "surroundings", LIMIT, "it changed the response to Ctrl-C"),
         ("HANDLES_SIGNALS", "surroundings", LIMIT, "it changed the response to SIGTERM"),
         ("LOWERS_LIMITS", "surroundings", LIMIT, "it changed the limits RLIMIT_NOFILE"),
         ("SETS_ENVIRONMENT", "surroundings", LIMIT, "it changed the environment variables LIAR_HOME"),
