@@ -176,7 +176,8 @@ def test_an_end_that_never_comes_ends_a_script_in_words_and_keeps_what_was_strea
         "from cosim import Scenario; from cosim.process import exit_guard; exit_guard._ENDING = 0.3; "
         f"Scenario.load({saved(fmu, tmp_path, 'hangs-when-freed')!r}).run(stream='out')"
     )
-    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=60.0)
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60.0, check=False)
     assert done.returncode == 2
     assert "component 'bad' in freeInstance at t = 0.5 s has not returned for 0.3 s" in done.stderr
     assert len(load_result(tmp_path / "out").table) == 51
