@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
@@ -54,6 +54,7 @@ class ProbeRun:
             less, more = (self._run({**parameters, name: value}) for value in (tried, MORE * tried))
             if less is None or more is None or monotonic() > self.deadline:
                 return None
+            less, more = _at_common_instants(less, more)
             columns = {n: more[n] - less[n] for n in less if n != "time"}
             response = StepResponse(less["time"], (MORE - 1.0) * tried, columns)
             if size is not None or any(np.ptp(less[n]) > _MOVES for n in response.speeds()):
@@ -70,10 +71,18 @@ class ProbeRun:
         return None if ended.failure is not None else ended.row
 
 
+def _at_common_instants(*runs: Mapping[str, np.ndarray]) -> Iterator[Mapping[str, np.ndarray]]:
+    """Columns of two runs at the instants that both have: events of the FMU may lie elsewhere in each."""
+    _, *places = np.intersect1d(*(run["time"] for run in runs), return_indices=True)
+    for run, place in zip(runs, places, strict=True):
+        yield {name: column[place] for name, column in run.items()}
+
+
 def columns_of(outcome: Outcome) -> Mapping[str, np.ndarray]:
-    """The columns of a run of the FMU alone, by their names in it.
+    """The columns of a run of the FMU alone, by their names in it; of an event the row after it.
 
     Args:
         outcome: of the run.
     """
-    return {name.removeprefix(f"{NAME}."): np.asarray(outcome[name]) for name in outcome}
+    last = np.append(np.diff(outcome.result.time) > 0.0, True)
+    return {name.removeprefix(f"{NAME}."): np.asarray(outcome[name])[last] for name in outcome}
