@@ -336,7 +336,8 @@ class Instance(Described):
         """
         if isinstance(error, FMICallException) and getattr(error, "status", None) == FATAL:
             self._alive = self._running = False
-        stated = getattr(self.slave, "reason", "")  # of one that is stepped by a solver here, which says more
+        # of one that is stepped by a solver here, which says more; there is none while a library is loaded
+        stated = getattr(getattr(self, "slave", None), "reason", "")
         return self.failure(f"{what} failed: {stated or error or type(error).__name__}", t)
 
     def discarded(self, error: Exception, asked: str, t: float) -> Exception:
