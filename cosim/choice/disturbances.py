@@ -127,8 +127,8 @@ def drawn(number: int, seed: int, journey: Journey) -> Disturbance:
 
     Mass is wrong by 5 to 20 %, resistance by 10 to 50 %, the wheel by 0.3 to 1 %; readings have a noise of 0.02 to
     0.1 m/s; slopes go up to 8 per mille; a network loses 5 to 20 % more; wheels jam while the train brakes (depth 0.3
-    to 1) and skid while it gathers speed (0.1 to 0.5), most often while it is slow, for 0.5 to 3 s. Signs follow from
-    the number, so that four seeds have both of each.
+    to 1) and skid while it gathers speed (0.1 to 0.5), for 0.5 to 3 s. Signs follow from the
+    number, so that four seeds have both of each.
 
     Args:
         number: of the seed, from 1. seed: of the run. journey: of the train.
@@ -176,8 +176,8 @@ def _faults(rng: np.random.Generator, journey: Journey, wanted: float) -> list[O
     moving = np.abs(journey.speed) > _MOVES
     pace = _accelerations(journey)
     pulls, gathers = moving & (pace > _PULLS), moving & (pace > _GATHERS)
-    jams = _instants(rng, journey, moving & (pace < _BRAKES), every=15.0)
-    skids = _instants(rng, journey, gathers if np.any(gathers) else pulls, every=20.0, slow=True)
+    jams = _instants(rng, journey.time[moving & (pace < _BRAKES)], every=15.0)
+    skids = _instants(rng, journey.time[gathers if np.any(gathers) else pulls], every=20.0)
     every: list[OdometerFault] = []
     for onset, kind in sorted([(t, -1.0) for t in jams] + [(t, 1.0) for t in skids]):
         depth = rng.uniform(0.3, 1.0) if kind < 0.0 else rng.uniform(0.1, 0.5)
@@ -208,19 +208,10 @@ def _accelerations(journey: Journey) -> np.ndarray:
     return np.asarray(after - before)
 
 
-def _instants(
-    rng: np.random.Generator, journey: Journey, rows: np.ndarray, every: float, *, slow: bool = False
-) -> list[float]:
-    """Instants drawn from those of some rows [s]: one at least, and at most one for each `every` seconds of them.
-
-    Args:
-        rows: which, shape (rows,). slow: whether they are so much more frequent as the train is slower, since so much
-            more is then the effort of a given power.
-    """
-    times, pace = journey.time[rows], np.abs(journey.speed[rows])
+def _instants(rng: np.random.Generator, times: np.ndarray, every: float) -> list[float]:
+    """Instants drawn from those of the rows [s]: one at least, and at most one for each `every` seconds of them."""
     if not len(times):
         return []
     seconds = len(times) * float(np.median(np.diff(times, append=times[-1] + every)))
     most = int(np.clip(round(seconds / every), 1, _MOST))
-    weights = 1.0 / pace if slow else np.ones(len(times))
-    return [float(t) for t in rng.choice(times, rng.integers(1, most + 1), p=weights / np.sum(weights))]
+    return [float(t) for t in rng.choice(times, rng.integers(1, most + 1))]

@@ -33,7 +33,7 @@ def test_four_seeds_have_both_signs_of_every_error(way: Journey, seed: int) -> N
 
 
 @given(JOURNEYS, st.integers(0, 10**6), st.integers(1, 9), st.booleans())
-def test_wheels_jam_while_the_train_brakes_and_skid_while_it_pulls_one_at_a_time(
+def test_wheels_jam_while_the_train_brakes_and_skid_while_it_gathers_speed_one_at_a_time(
     way: Journey, seed: int, number: int, twice: bool
 ) -> None:
     found = drawn(number, seed, way)
@@ -43,7 +43,7 @@ def test_wheels_jam_while_the_train_brakes_and_skid_while_it_pulls_one_at_a_time
         change = np.interp(way.time[row] + 0.5, way.time, way.speed) - np.interp(
             way.time[row] - 0.5, way.time, way.speed
         )
-        assert change < -0.05 if fault.kind < 0.0 else change > -0.05
+        assert change < -0.05 if fault.kind < 0.0 else change > 0.0
         assert way.speed[row] > 0.9
         assert 0.0 < fault.depth <= 1.0
     ends = [fault.onset + fault.length for fault in faults]
@@ -107,13 +107,3 @@ def test_what_an_observer_does_not_take_is_no_cause() -> None:
     assert "slope" in both.cause(2.0, odometer=False)
     assert "skids" in both.cause(2.0, effort=False)
     assert both.cause(8.5, effort=False) == ""
-
-
-def test_skids_are_as_frequent_in_each_doubling_of_the_speed() -> None:
-    """From 1 to 16 m/s: the slower, the larger is the effort of a given power."""
-    way = journey(16.0, 0.4, 20.0)
-    skids = [f for number in range(1, 600) for f in drawn(number, 7, way).faults if f.kind > 0.0]
-    speeds = np.interp([f.onset for f in skids], way.time, way.speed)
-    counts = np.histogram(np.log2(speeds), bins=[0.0, 1.0, 2.0, 3.0, 4.0])[0]
-    assert counts.sum() == len(skids)
-    assert np.all(np.abs(counts / len(skids) - 0.25) < 0.06)
