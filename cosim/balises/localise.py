@@ -3,6 +3,7 @@
 | method | needs | error |
 |---|---|---|
 | ``early-return`` | an FMI 3 plant with event mode that reports the crossing itself | the plant's own |
+| ``dense-output`` | a model exchange plant, which a solver moves here | root search on the solver's polynomial |
 | ``rollback`` | an exact state and steps of any length | root search on re-done steps |
 | ``predict`` | steps of any length | interpolation over the last short cut |
 | ``interpolate`` | nothing | cubic over the step; the bound is reported |
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.balises.dense_output import DenseOutputLocaliser
 from cosim.balises.early_return import EarlyReturnLocaliser
 from cosim.balises.hermite import HermiteStep, time_to_reach
 from cosim.balises.layout import InstantLayout, TrackLayout
@@ -125,16 +127,19 @@ class _PredictLocaliser(Localiser):
         return until if until - cut <= _FINE_CUT else cut
 
 
-def choose(honest_step: bool, restores: Restores, clock: str | None) -> tuple[Method, str]:
+def choose(honest_step: bool, restores: Restores, clock: str | None, *, solved: bool = False) -> tuple[Method, str]:
     """The best method a probed plant allows, and why.
 
     Args:
         honest_step: steps of any length were seen to do what they say.
         restores: how what followed a restored state was seen to continue.
         clock: output clock that reports crossings, where the scenario names one.
+        solved: a solver moves the plant here, and can be asked.
     """
     if clock is not None:
         return "early-return", f"the plant reports crossings on its clock '{clock}'"
+    if solved and honest_step:
+        return "dense-output", "the plant is a model exchange FMU, whose solver knows its states at every instant"
     if restores == "exact" and honest_step:
         return "rollback", "the plant restores its state exactly and takes steps of any length"
     if honest_step:
@@ -163,6 +168,8 @@ def make_localiser(
         if clock is None:
             raise CouplingError("balises.method = 'early-return' needs balises.clock, the plant's output clock.")
         return EarlyReturnLocaliser(watch, layout, clock)
+    if method == "dense-output":
+        return DenseOutputLocaliser(watch, layout)
     if method == "rollback":
         if not watch.component.can_save:
             raise CouplingError(

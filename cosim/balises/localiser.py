@@ -17,8 +17,8 @@ from cosim.balises.plant_monitor import PlantMonitor
 from cosim.balises.telegram import Crossing
 from cosim.restorable import Restorable
 
-Method = Literal["early-return", "rollback", "predict", "interpolate", "recorded"]
-METHODS: tuple[Method, ...] = ("early-return", "rollback", "predict", "interpolate")
+Method = Literal["early-return", "dense-output", "rollback", "predict", "interpolate", "recorded"]
+METHODS: tuple[Method, ...] = ("early-return", "dense-output", "rollback", "predict", "interpolate")
 """Those that find crossings; what was ``recorded`` need not be found."""
 
 ACCELERATION_LIMIT = 5.0

@@ -132,6 +132,8 @@ class Crossings:
         channel, layout, plant = self.service.channel, self.localiser.layout, self.localiser.watch.component
         if isinstance(self.localiser, RecordedLocaliser):
             return isinstance(plant, RecordingComponent)
+        if self.localiser.method != "rollback":
+            return False
         changed = channel.missed_fraction or channel.missed or channel.latency or channel.latency_jitter
         if channel.position_noise and isinstance(layout, TrackLayout):
             changed = changed or any(balise.location_accuracy for balise in layout.balises)

@@ -20,6 +20,7 @@ from cosim.errors import CouplingError, ScenarioError
 from cosim.run.layouts import Layout
 from cosim.scenario.scenario_tables import BalisesTable
 from fmus.check.probe import ProbeReport, probe
+from fmus.exchange.slave import solver_of
 from plant_models.disk_cache.entries import keep, recall
 from plant_models.disk_cache.identity import identity
 from plant_models.hybrid.units import UnitError, conversion, parse_unit
@@ -169,7 +170,9 @@ def choose_method(
     if component.kind == RECORDING:
         return LocatingChoice("rollback", _PLAYED_BACK) if asked is None else LocatingChoice(asked, _ASKED_FOR)
     report = _known_probe(make, starts, start, step)
-    chosen, reason = choose(report.honest_step, report.restores, table.clock)
+    chosen, reason = choose(
+        report.honest_step, report.restores, table.clock, solved=solver_of(component.slave) is not None
+    )
     method, why = (chosen, reason) if asked is None else (asked, _ASKED_FOR)
     error = _plant_error(table, method, component, start, report)
     warnings = []
@@ -208,8 +211,8 @@ def _plant_error(
         return PlantError(tolerance=tolerance, unknown=unknown)
     scale = abs(_conversion(component, str(table.position), "m")[0])
     spread, drift = (scale * seen.get(signal, 0.0) for seen in (report.spread, report.drift))
-    if signal in report.spread and spread == 0.0:
-        tolerance = 0.0
+    if signal in report.spread and spread == 0.0 and solver_of(component.slave) is None:
+        tolerance = 0.0  # a solver here errs by it, however its steps lie
     return PlantError(0.0 if method in _UNTOUCHED else spread, tolerance, drift, start, unknown)
 
 

@@ -173,7 +173,7 @@ class BalisesTable(TomlTable):
     track_end: float | None = None
     expected_speed: Annotated[float, Field(gt=0.0)] | None = None
     location_accuracy: Annotated[float, Field(ge=0.0, le=63.0)] = 0.0
-    method: Literal["auto", "early-return", "rollback", "predict", "interpolate"] = "auto"
+    method: Literal["auto", "early-return", "dense-output", "rollback", "predict", "interpolate"] = "auto"
     clock: str | None = None
     jerk_bound: Annotated[float, Field(gt=0.0)] = 10.0
     timing: Literal["exact", "stale"] = "exact"

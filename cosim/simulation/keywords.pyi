@@ -90,7 +90,7 @@ class BalisesKeywords(TypedDict, total=False):
     track_end: float | None
     expected_speed: float | None
     location_accuracy: float
-    method: Literal["auto", "early-return", "rollback", "predict", "interpolate"]
+    method: Literal["auto", "early-return", "dense-output", "rollback", "predict", "interpolate"]
     clock: str | None
     jerk_bound: float
     timing: Literal["exact", "stale"]

@@ -24,6 +24,7 @@ up.
 """
 
 _RATES = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+_WEIGHTS = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 _LIBRARIES = (
     "sundials_core",
     "sundials_nvecserial",
@@ -36,6 +37,10 @@ _FOLDERS = {"x86_64-darwin": "aarch64-darwin"}
 """Where fmpy keeps the libraries of a platform under the name of another one, whose files serve both."""
 _ONE_STEP = 2
 _AT_STOP, _AT_ROOT = 1, 2
+_START, _FINEST, _STARTED = 1e-3, 1e-12, 3
+"""Below this order the tolerance is a thousandth: else each start, of order one, would err by as much as the whole run
+may, and an input that jumps at every communication point adds them up. Not below the second number.
+"""
 _NUMBERS: dict[Method, int] = {"bdf": 2, "adams": 1}
 
 
@@ -113,12 +118,12 @@ class Cvode:
         self._library.SUNContext_Create(0, ctypes.byref(self._context))
         self._library.SUNContext_ClearErrHandlers(self._context)
         self._x, self.states = self._vector()
-        self._absolute, self.absolute = self._vector()
         self._dense, self._states_between = self._vector()
         self.tolerance = tolerance
-        self.absolute[:] = tolerance * nominals
+        self.absolute = tolerance * nominals
+        self._weights, self._views = _WEIGHTS(self._weigh), dict[int, np.ndarray]()
         self._rates, self._roots = _RATES(self._with_arrays(rates)), _RATES(self._with_roots(roots, root_count))
-        self._reached = ctypes.c_double()
+        self._reached, self._order, self._share = ctypes.c_double(), ctypes.c_int(), 1.0
         self.steps = 0
 
     def restart(self, t: float) -> None:
@@ -130,7 +135,7 @@ class Cvode:
         if self._memory is None:
             self._begin(t)
         self._call("CVodeReInit", ctypes.c_double(t), self._x)
-        self._call("CVodeSVtolerances", ctypes.c_double(self.tolerance), self._absolute)
+        self._share = max(_START, min(1.0, _FINEST / self.tolerance))
 
     def step(self, stop: float) -> tuple[float, bool]:
         """One internal step, which ends at `stop` [s] at the latest.
@@ -149,6 +154,9 @@ class Cvode:
         )
         if flag < 0:
             self._fail(flag)
+        if self._share < 1.0:
+            self._call("CVodeGetLastOrder", ctypes.byref(self._order))
+            self._share = 1.0 if self._order.value >= _STARTED else self._share
         return (stop if flag == _AT_STOP else float(reached.value)), flag == _AT_ROOT
 
     def between(self, t: float) -> np.ndarray:
@@ -168,7 +176,7 @@ class Cvode:
         library, context = self._library, self._context
         self._memory = library.CVodeCreate(ctypes.c_int(self._method), context)
         self._call("CVodeInit", self._rates, ctypes.c_double(t), self._x)
-        self._call("CVodeSVtolerances", ctypes.c_double(self.tolerance), self._absolute)
+        self._call("CVodeWFtolerances", self._weights)
         self._call("CVodeRootInit", ctypes.c_int(self._root_count), self._roots)
         size = ctypes.c_int64(self._count)
         matrix = ctypes.c_void_p(library.SUNDenseMatrix(size, size, context))
@@ -190,6 +198,23 @@ class Cvode:
         if made is None:
             made = self._arrays[address] = (ctypes.c_double * self._count).from_address(address)
         return made
+
+    def _weigh(self, x: int, weights: int, _data: Any) -> int:
+        """Weights of errors: one over the tolerated error of each state."""
+        states, written = self._view(x), self._view(weights)
+        tolerated = self._share * (self.tolerance * np.abs(states) + self.absolute)
+        if not np.all(tolerated > 0.0):
+            return -1
+        np.divide(1.0, tolerated, out=written)
+        return 0
+
+    def _view(self, vector: int) -> np.ndarray:
+        """The numbers of a vector, whose place is always the same."""
+        found = self._views.get(vector)
+        if found is None:
+            address = self._library.N_VGetArrayPointer(vector)
+            found = self._views[vector] = np.ctypeslib.as_array(self._array(address))
+        return found
 
     def _with_arrays(self, rates: Rates) -> Callable[..., int]:
         place, array = self._library.N_VGetArrayPointer, self._array

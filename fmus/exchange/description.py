@@ -49,7 +49,7 @@ def as_stepped(description: ModelDescription, interface: Interface | None = None
         modelIdentifier=own.modelIdentifier,
         canHandleVariableCommunicationStepSize=True,
         hasEventMode=in_events,
-        mightReturnEarlyFromDoStep=in_events,
+        mightReturnEarlyFromDoStep=in_events and bool(description.numberOfEventIndicators),
         **shared,
     )
     return stepped

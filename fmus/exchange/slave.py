@@ -81,6 +81,14 @@ class CoSimulationFunctions:
         if self.motion is not None:
             self.motion.follower = part
 
+    def look(self, t: float) -> None:
+        """Put the FMU at an instant within the solver's last step, while somebody follows it.
+
+        Args:
+            t: instant [s].
+        """
+        self._motion.look(t)
+
     def last_time(self, kind: int) -> float:
         """fmi2GetRealStatus: where the last step ended [s].
 
@@ -329,16 +337,30 @@ class CoSimulationFunctions:
 
 
 def as_slave(slave: Any, description: ModelDescription, method: Method = "bdf") -> Any:
-    """fmpy's model of a model exchange FMU with the call surface of fmpy's slave; `functions` are what it got.
+    """fmpy's model of a model exchange FMU with the call surface of fmpy's slave; see `solver_of`.
 
     Args:
         slave: with its library loaded, not yet instantiated.
         description: its model description. method: of the solver.
     """
-    functions = slave.functions = CoSimulationFunctions(slave, description, method)
+    functions = slave.solved = CoSimulationFunctions(slave, description, method)
     instantiate, names = slave.instantiate, {"loggingOn", "logMessage", "callbacks", "functions", "visible"}
     slave.instantiate = lambda **stated: instantiate(**{k: v for k, v in stated.items() if k in names})
     slave.getRealStatus, slave.getBooleanStatus = functions.last_time, functions.has_terminated
     if fmi_version(description) == 1:
-        slave.initialize = functions.initialize_first
+        slave.initialize, slave.reset = functions.initialize_first, _no_reset
     return slave
+
+
+def _no_reset() -> None:
+    raise RuntimeError("model exchange of FMI 1.0 has no reset")
+
+
+def solver_of(slave: Any) -> CoSimulationFunctions | None:
+    """What moves a slave that was made by `as_slave`; None of another one.
+
+    Args:
+        slave: of a component.
+    """
+    found: CoSimulationFunctions | None = getattr(slave, "solved", None)
+    return found

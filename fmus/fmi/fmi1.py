@@ -86,7 +86,7 @@ class FMI1Slave(WholeStepSlave):
         self._initialized = self._running = True
 
     def _after_discard(self, error: FMICallException, t: float, until: float) -> None:
-        solved = getattr(self.slave, "functions", None)  # model exchange knows of an end, co-simulation of FMI 1 not
+        solved = getattr(self.slave, "solved", None)  # model exchange knows of an end, co-simulation of FMI 1 not
         if solved is not None and solved.has_terminated():
             self.time, self.terminated = solved.reached, True
             return

@@ -127,7 +127,7 @@ def test_time_events_are_hit_exactly_and_an_end_that_is_asked_for_is_the_end(
 def test_an_event_after_a_step_of_the_solver_is_handled(folder: Path, stepped: list[Stepped], version: int) -> None:
     fmu = Stepped(exchange_fmu(folder, "STEPS", version))
     stepped.append(fmu)
-    assert fmu.to(0.5).tolist() == pytest.approx([math.exp(-0.5), 0.0], abs=1e-9)
+    assert fmu.to(0.5).tolist() == pytest.approx([math.exp(-0.5), 0.0], abs=1e-8)
     position, count = fmu.to(1.5)
     assert count == 1.0
     assert 2.0 * math.exp(-1.0) - 1e-8 < position < 2.0 * math.exp(-1.0) * 1.1  # it jumped within a step
@@ -164,7 +164,7 @@ def test_a_solver_goes_on_with_what_it_knows_where_nothing_jumps(folder: Path, s
     for k in range(1, 51):
         still.to(0.1 * k, 0.0)
         jumping.to(0.1 * k, float(k % 2))
-    steps = [one.component.slave.functions.motion.solver.steps for one in (still, jumping)]
+    steps = [one.component.slave.solved.motion.solver.steps for one in (still, jumping)]
     assert 3 * steps[0] < steps[1]
 
 
@@ -194,7 +194,7 @@ def test_the_tolerance_is_that_of_the_solver(folder: Path, method: str) -> None:
     errors = []
     for tolerance in (1e-4, 1e-7, 1e-10):
         fmu = Stepped(exchange_fmu(folder, "DECAY"), tolerance)
-        fmu.component.slave.functions._method = method
+        fmu.component.slave.solved._method = method
         errors.append(abs(fmu.to(3.0)[0] - math.exp(-3.0)))
         fmu.free()
     assert errors[0] > errors[1] > errors[2]
