@@ -20,6 +20,7 @@ from cosim.errors import nearest
 from cosim.fmu_filter.belief import ExtendedFilter, FmuFilter, Noises, UnscentedFilter
 from cosim.fmu_filter.journal import EQUAL_WITHIN, FilterJournal
 from cosim.fmu_filter.many import EnsembleFilter, FmuParticleFilter
+from cosim.fmu_filter.scale import Scale, scale_of, shown
 from cosim.fmu_filter.settings import FilterTable
 from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
@@ -27,7 +28,7 @@ from cosim.fmu_model.trust import check_saving, check_states, usual_step
 from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.noise import FROM_NAME, RUN_SEED, seed_of
 from plant_models.hybrid.signal import Signal, input_signal, output_signal
-from plant_models.hybrid.units import UnitError, parse_unit
+from plant_models.hybrid.units import parse_unit
 
 Array = NDArray[np.float64]
 MEASURED = "measured_"
@@ -70,7 +71,7 @@ class FmuFilterModel:
         self._start = model.start.copy()
         self._seen = [_place(model, "output", model.outputs, name) for name in table.measurements]
         self._R = np.diag([value**2 for value in table.measurements.values()])
-        self._balise, self._metre = _position(model, table.balise)
+        self._balise, self._metres = _position(model, table.balise)
         intensity = np.diag(_by_name(model, "state", model.states, table.process_noise) ** 2)
         noisy = np.diag(_by_name(model, "input", model.inputs, table.input_noise) ** 2)
         self._engine = _engine(table, model, Noises(intensity, noisy))
@@ -79,9 +80,10 @@ class FmuFilterModel:
         if table.kind != "particle":
             self._P = np.diag(_by_name(model, "state", model.states, table.start_deviation) ** 2)
         self._words = _legal_names([*model.inputs, *model.states, *model.outputs])
-        self.inputs = [_signal(model, name, "input", self._words[name]) for name in model.inputs]
+        self._scales: dict[str, Scale] = {}
+        self.inputs = [self._signal(name, "input", self._words[name]) for name in model.inputs]
         self.inputs += [
-            replace(_signal(model, name, "input", MEASURED + self._words[name]), can_be_missing=True)
+            replace(self._signal(name, "input", MEASURED + self._words[name]), can_be_missing=True)
             for name in table.measurements
         ]
         self.outputs = self._output_signals()
@@ -112,6 +114,8 @@ class FmuFilterModel:
         if self._unchecked:
             self._check_step(dt)
         journal = self._begun(t)
+        if self._scales:
+            inputs = {name: self._scales[name].own(x) if name in self._scales else x for name, x in inputs.items()}
         self._u = np.array([inputs[name] for name in self._driven], dtype=float)
         journal.predict(dt, self._u)
         now = t + dt
@@ -140,7 +144,7 @@ class FmuFilterModel:
         journal = self._begun(stamp)
         assert self._balise is not None
         deviation = location_accuracy if location_accuracy > 0.0 else self._made_of[1].balise_deviation
-        y, R = np.array([position * self._metre]), np.array([[(deviation * self._metre) ** 2]])
+        y, R = np.array([self._metres.own(position)]), np.array([[(deviation / self._metres.factor) ** 2]])
         taken = journal.correct(stamp, self._u, [self._balise], y, R)
         return self._values(journal.t) if taken else False
 
@@ -189,13 +193,12 @@ class FmuFilterModel:
         deviations = np.sqrt(np.maximum(belief.P.diagonal(), 0.0))
         found.update(zip(self._deviations, deviations.tolist(), strict=True))
         found["nis"], found["nis_degrees"] = belief.nis, float(belief.degrees)
-        return found | {MISSED_SAMPLES: float(self._missed)}
+        return shown(self._scales, found | {MISSED_SAMPLES: float(self._missed)})
 
     def _output_signals(self) -> list[Signal]:
-        model = self._model
-        names = list(dict.fromkeys([*model.states, *model.outputs]))
-        found = [_signal(model, name, "output", self._words[name]) for name in names]
-        found += [_signal(model, name, "output", f"{self._words[name]}_std") for name in self._estimated]
+        names = list(dict.fromkeys([*self._model.states, *self._model.outputs]))
+        found = [self._signal(name, "output", self._words[name]) for name in names]
+        found += [self._signal(name, "output", f"{self._words[name]}_std", deviation=True) for name in self._estimated]
         return [
             *found,
             output_signal("nis", "1", "NIS of the last sample"),
@@ -203,10 +206,28 @@ class FmuFilterModel:
             output_signal(MISSED_SAMPLES, "1", "Measurements that were missing at a sample", variability="discrete"),
         ]
 
+    def _signal(self, source: str, causality: str, name: str, *, deviation: bool = False) -> Signal:
+        """A signal like a variable of the FMU; how it is converted is kept in `_scales`."""
+        model = self._model
+        variable = model.instance.variables.element(source).variable
+        scale = scale_of(model.instance.description, variable)
+        scale = scale.of_deviations if deviation else scale
+        if not scale.is_plain:
+            self._scales[name] = scale
+        text = variable.description or source
+        if causality == "input":
+            own = model.start_inputs[model.inputs.index(source)] if source in model.inputs else 0.0
+            start = scale.shown(float(own)) if name == self._words[source] else 0.0
+            return input_signal(name, scale.unit, start, text)
+        return output_signal(name, scale.unit, text)
+
     def __getattr__(self, name: str) -> float:
         """First outputs, before the first step: the start."""
         if name.startswith("_"):
             raise AttributeError(name)
+        return shown(self._scales, {name: self._first(name)})[name]
+
+    def _first(self, name: str) -> float:
         states = [self._words[state] for state in self._model.states]
         first = dict(zip(states, self._start.tolist(), strict=True))
         first |= zip(self._deviations, np.sqrt(np.diagonal(self._P)).tolist(), strict=True)
@@ -279,22 +300,20 @@ def _place(model: SealedModel, what: str, names: tuple[str, ...], name: str) -> 
     return names.index(name)
 
 
-def _position(model: SealedModel, name: str | None) -> tuple[int | None, float]:
-    """The place of the output that telegrams measure, and a metre in its unit; what has no unit that we know is taken
-    as metres.
+def _position(model: SealedModel, name: str | None) -> tuple[int | None, Scale]:
+    """The place of the output that telegrams measure, and how it is shown in metres; what has no unit that we know is
+    taken as metres.
     """
     if name is None:
-        return None, 1.0
+        return None, Scale("m")
     place = _place(model, "output", model.outputs, name)
-    try:
-        unit = parse_unit(model.unit(name))
-    except UnitError:
-        return place, 1.0
+    scale = scale_of(model.instance.description, model.instance.variables.element(name).variable)
+    unit = parse_unit(scale.unit)
     if unit.exponents not in (parse_unit("m").exponents, parse_unit("1").exponents):
         raise FmuModelError(
             f"{model.path}: balise = {name!r}: it is in {model.unit(name)}; a telegram measures a position [m]."
         )
-    return place, 1.0 / unit.factor
+    return place, Scale("m", unit.factor * scale.factor, unit.factor * scale.offset)
 
 
 def _by_name(model: SealedModel, what: str, names: tuple[str, ...], stated: Mapping[str, float]) -> Array:
@@ -309,21 +328,6 @@ def _numbers(parameters: Mapping[str, Any]) -> dict[str, float]:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise FmuModelError(f"parameter {name} = {value!r}: an FMU in a filter takes numbers.")
     return {name: float(value) for name, value in parameters.items()}
-
-
-def _signal(model: SealedModel, source: str, causality: str, name: str) -> Signal:
-    """A signal like a variable of the FMU, with its unit where that is one we know."""
-    unit = model.unit(source)
-    try:
-        parse_unit(unit)
-    except UnitError:
-        unit = "1"
-    variable = model.instance.variables[source]
-    text = variable.description or source
-    if causality == "input":
-        start = model.start_inputs[model.inputs.index(source)] if name == source else 0.0
-        return input_signal(name, unit, float(start), text)
-    return output_signal(name, unit, text)
 
 
 def _start_value(path: str | Path, name: str) -> float:

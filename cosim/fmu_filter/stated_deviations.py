@@ -31,4 +31,4 @@ def _in_si(fmu: DescribedComponent, name: str, value: float) -> str | None:
     if named is None or named.unit is None or named.unit.factor == 1.0:
         return None
     si = NAMED.get(named.unit.exponents, "in SI units")
-    return f"{value:g} {named.name} ({named.unit.factor * value:.3g} {si})"
+    return f"{value:g} {named.name} ({abs(named.unit.factor) * value:.3g} {si})"
