@@ -71,10 +71,12 @@ class ProbeRun:
         return None if ended.failure is not None else ended.row
 
 
-def _at_common_instants(*runs: Mapping[str, np.ndarray]) -> Iterator[Mapping[str, np.ndarray]]:
+def _at_common_instants(
+    one: Mapping[str, np.ndarray], other: Mapping[str, np.ndarray]
+) -> Iterator[Mapping[str, np.ndarray]]:
     """Columns of two runs at the instants that both have: events of the FMU may lie elsewhere in each."""
-    _, *places = np.intersect1d(*(run["time"] for run in runs), return_indices=True)
-    for run, place in zip(runs, places, strict=True):
+    _, *places = np.intersect1d(one["time"], other["time"], return_indices=True)
+    for run, place in zip((one, other), places, strict=True):
         yield {name: column[place] for name, column in run.items()}
 
 
