@@ -25,6 +25,7 @@ DEFAULTS: Mapping[str, Any] = {
     "file": "",
     "sha256": "",
     "display_unit": None,
+    "declared_unit": None,
     "description": "",
     "delivery": None,
 }

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from cosim.cli.arguments import settings_argument
 from cosim.cli.scenarios import load_scenario
 from cosim.cli.trajectory import TRAJECTORY, export_trajectory
 from cosim.errors import OutputError, ScenarioError
+from cosim.results.declared_units import in_si_only
 from cosim.results.formats.known_formats import format_of
 from cosim.results.load_result import load_result
 from cosim.results.save import save_result
@@ -47,7 +49,8 @@ ARGUMENTS = (
     ArgumentGroup(
         (
             argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="these only, e.g. 'train.*'"),
-            argument("--no-units", action="store_true", help="CSV headings without units"),
+            argument("--si", action="store_true", help="CSV in SI also where FMUs declare other units"),
+            argument("--no-units", action="store_true", help="CSV headings without units, in SI"),
         ),
         "a result",
     ),
@@ -58,7 +61,7 @@ ARGUMENTS = (
 def execute(options: argparse.Namespace) -> Output:
     """Read, choose, write, as the options ask; what was written and what the format does not keep."""
     if is_package(str(options.target)):
-        _refuse(options, "a scenario", "signals", "no_units", "trajectory")
+        _refuse(options, "a scenario", "signals", "si", "no_units", "trajectory")
         path = load_scenario(options).export_ssp(options.target, options.ssp_version or "2.0")
         return Output([str(path)], {"file": str(path)})
     _refuse(options, "a result", "settings", "ssp_version")
@@ -86,6 +89,8 @@ def _export_result(source: str, options: argparse.Namespace) -> Output:
     result = load_result(source)
     if options.signals:
         result = selected(result, options.signals)
+    if options.si:
+        result = replace(result, signals=in_si_only(result.signals))
     written = save_result(result, target, units=not options.no_units)
     counts = {"rows": len(result.table), "signals": len(result.signals), "telegrams": len(result.events)}
     lines = [f"{', '.join(f'{number} {what}' for what, number in counts.items())}: {', '.join(map(str, written))}"]

@@ -7,9 +7,13 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
+from cosim.results.declared_units import own_numbers
 from cosim.results.result_data import BaliseRecord, PacketRecord, ResultData, SignalInfo
 from cosim.results.save import save_result
 from cosim.results.to_frames import events_to_pandas, to_pandas, to_xarray
+from plant_models.hybrid.units import parse_unit
 
 __all__ = ["BaliseRecord", "PacketRecord", "Result", "SignalInfo"]
 
@@ -26,6 +30,20 @@ class Result(ResultData):
             data: as the readers of files return it.
         """
         return cls(**{field.name: getattr(data, field.name) for field in fields(ResultData)})
+
+    def declared(self, name: str) -> np.ndarray:
+        """Values of a signal in the unit in which its FMU counts, as the table of the results folder shows them, shape
+        (rows,); in SI where that is the same. Indexing gives SI.
+
+        Args:
+            name: of the signal.
+
+        Raises:
+            KeyError: it was not recorded.
+        """
+        values, unit = self[name], None if name == "time" else self.info(name).declared_unit
+        found = None if unit is None else own_numbers(values, parse_unit(unit))
+        return values if found is None else found
 
     def to_pandas(self, signals: Iterable[str] | None = None) -> Any:
         """A `pandas.DataFrame`; see `cosim.results.to_frames.to_pandas`.

@@ -24,6 +24,7 @@ class SignalInfo:
         variability: ``continuous`` or ``discrete`` (held between its changes).
         description: one line.
         can_be_missing: whether NaN says that there is no value.
+        declared_unit: unit in which its FMU counts, in which text tables show it; None for `unit`.
     """
 
     name: str
@@ -32,6 +33,7 @@ class SignalInfo:
     variability: Literal["continuous", "discrete"] = "continuous"
     description: str = ""
     can_be_missing: bool = False
+    declared_unit: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

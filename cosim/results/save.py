@@ -7,7 +7,6 @@ from pathlib import Path
 from cosim.errors import OutputError
 from cosim.results.formats.csv_file import write_csv
 from cosim.results.formats.format import Format
-from cosim.results.formats.headings import with_unit
 from cosim.results.formats.known_formats import check_formats, format_of
 from cosim.results.record_rows import EVENTS_SUFFIX, TELEGRAM_ROWS
 from cosim.results.result_data import ResultData
@@ -50,12 +49,10 @@ def save_result(result: ResultData, path: str | Path, *, units: bool = True) -> 
 
 
 def _write(result: ResultData, path: Path, wanted: type[Format], units: bool) -> None:
-    if wanted.name != "csv" or not units:
+    if wanted.name == "csv" and not units:
+        write_csv(path, result.table)
+    else:
         wanted.write(path, result)
-        return
-    known = {signal.name: signal.unit for signal in result.signals}
-    headings = [with_unit(name, known.get(name, "1")) for name in (result.table.dtype.names or ())[1:]]
-    write_csv(path, result.table, ["time", *headings])
 
 
 def _events_beside(result: ResultData, target: Path, wanted: type[Format]) -> list[Path]:

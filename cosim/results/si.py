@@ -127,4 +127,17 @@ def _to_convert(signal: SignalInfo, unit_of: UnitOf) -> Unit | None:
 def _described(signal: SignalInfo, unit: Unit | None) -> SignalInfo:
     if unit is None:
         return signal
-    return replace(signal, unit=_si_name(unit), display_unit=signal.display_unit or signal.unit)
+    names = [name for name in (signal.unit, signal.display_unit) if name is not None]
+    declared = next((name for name in names if _is_called(unit, name)), None)
+    display = signal.display_unit or signal.unit
+    return replace(signal, unit=_si_name(unit), display_unit=display, declared_unit=declared)
+
+
+def _is_called(unit: Unit, name: str) -> bool:
+    """Whether everybody understands this unit by a name, but for its sign."""
+    try:
+        meant = parse_unit(name)
+    except UnitError:
+        return False
+    same_size = meant.factor in (unit.factor, -unit.factor)
+    return same_size and (meant.exponents, meant.offset) == (unit.exponents, unit.offset)

@@ -22,6 +22,7 @@ from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.evaluate import evaluate
 from cosim.process.interruption import Interruption
+from cosim.results.declared_units import in_si_only
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.si import InFormerUnits, in_si
 from cosim.run.network_remarks import network_summary, packet_gaps
@@ -318,5 +319,7 @@ def _in_si(ready: Ready, telegrams: list[BaliseRecord], failure: str | None) -> 
     else:
         ready.stream.finish()
         signals = ready.stream.signals
+    if ready.task.table.report.si:
+        signals = in_si_only(signals)
     packets = [] if ready.services.packets is None else ready.services.packets.records()
     return Result(table, signals, telegrams, failure=failure, packets=packets)

@@ -318,3 +318,4 @@ class ReportTable(TomlTable):
     notes: list[str] = []
     measures: list[_MeasureItem] = []
     tables: list[Annotated[str, AfterValidator(_format)]] = ["csv"]
+    si: bool = False

@@ -191,6 +191,7 @@ class ReportKeywords(TypedDict, total=False):
     notes: Sequence[str]
     measures: Sequence[Any]
     tables: Sequence[str]
+    si: bool
 
 class ScenarioKeywords(TypedDict, total=False):
     """A whole scenario."""

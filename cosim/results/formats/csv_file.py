@@ -1,8 +1,10 @@
 """Tables as CSV, to the last bit and readable by ``fmpy.util.read_csv``. Touches only the file it is given.
 
-The first line holds the quoted names. Numbers are the shortest decimals that read back as the same float64, so nothing
-is lost; rows with the same time (before and after an event) stay as they are. Only the payload bits of a NaN are not
-kept. FMPy splits lines at every comma, so names such as ``a[1,2]`` are read by `read_csv` but not by FMPy.
+The first line holds the quoted names with their units, ``train.speed [km/h]``: those that the FMUs declare, else SI; a
+column without a unit is in SI. Read, all are in SI, with the bits that they had. Numbers are the shortest decimals that
+read back as the same float64, so nothing is lost; rows with the same time (before and after an event) stay as they are.
+Only the payload bits of a NaN are not kept. FMPy splits lines at every comma, so names such as ``a[1,2]`` are read by
+`read_csv` but not by FMPy.
 """
 
 from __future__ import annotations
@@ -15,8 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cosim.results.declared_units import in_own_units, meant_unit, own_units
 from cosim.results.formats.format import Format, bare
-from cosim.results.result_data import ResultData
+from cosim.results.formats.headings import split_unit, with_unit
+from cosim.results.result_data import ResultData, SignalInfo
+from cosim.results.si import convert
 from cosim.results.table_layout import column_names, table_dtype
 
 CHUNK = 4096  # rows turned into text at a time, so that memory stays flat
@@ -24,13 +29,19 @@ MANY = 50_000
 """Numbers from which on a compiled function writes them; it has to be loaded, or even compiled first."""
 
 
-def write_csv(path: str | Path, table: np.ndarray, headings: Sequence[str] | None = None) -> None:
+def write_csv(
+    path: str | Path,
+    table: np.ndarray,
+    headings: Sequence[str] | None = None,
+    shown: Callable[[np.ndarray], np.ndarray] = np.asarray,
+) -> None:
     """Write a result table as CSV.
 
     Args:
         path: file to write.
         table: structured array, shape (rows,), float64 fields, ``time`` first.
         headings: what to write above the columns instead of their names, e.g. names with units.
+        shown: what of some rows is written, e.g. their numbers in other units.
 
     Raises:
         ValueError: `table` is not a result table.
@@ -42,7 +53,7 @@ def write_csv(path: str | Path, table: np.ndarray, headings: Sequence[str] | Non
         csv.writer(file, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(headings or names)
     with Path(path).open("ab") as file:
         for start in range(0, len(table), CHUNK):
-            part = np.ascontiguousarray(table[start : start + CHUNK], dtype=table_dtype(names))
+            part = np.ascontiguousarray(shown(table[start : start + CHUNK]), dtype=table_dtype(names))
             file.write(rows(part.view(np.float64).reshape(len(part), len(names))))
 
 
@@ -58,6 +69,14 @@ def _rows_in_python(rows: np.ndarray) -> bytes:
     return "".join([",".join(map(repr, row)) + "\n" for row in rows.tolist()]).encode()
 
 
+def _unit_above(signal: SignalInfo, is_own: bool) -> str:
+    """The unit of the heading of a column; ``1``, no unit, where it would be read as another one than it is."""
+    if is_own and signal.declared_unit is not None:
+        return signal.declared_unit
+    read_as = split_unit(with_unit("x", signal.unit))[1] or "1"
+    return signal.unit if meant_unit(read_as) is None else "1"
+
+
 class CsvFormat(Format):
     """Text, for every program."""
 
@@ -68,7 +87,10 @@ class CsvFormat(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        write_csv(path, result.table)
+        units = own_units(result.table, result.signals)
+        named = {s.name: _unit_above(s, s.name in units) for s in result.signals}
+        headings = [with_unit(name, named.get(name, "1")) for name in column_names(result.table)[1:]]
+        write_csv(path, result.table, ["time", *headings], lambda rows: in_own_units(rows, units))
 
     @staticmethod
     def read(path: Path) -> ResultData:  # noqa: D102 - see Format
@@ -77,8 +99,9 @@ class CsvFormat(Format):
             if not names or names[0] != "time":
                 raise ValueError(f"{path} is not a result table: its first column must be 'time', got {names[:1]}.")
             first = file.readline()
+            headings = dict(map(split_unit, names))
             if not first:
-                return bare(np.empty(0, table_dtype(names)))
+                return bare(np.empty(0, table_dtype(list(headings))))
             try:
                 values = np.loadtxt(chain([first], file), delimiter=",", ndmin=2, comments=None)
             except ValueError as error:
@@ -87,4 +110,7 @@ class CsvFormat(Format):
             raise ValueError(
                 f"{path} is not a result table: {len(names)} names but {values.shape[1]} numbers in a row."
             )
-        return bare(values.view(table_dtype(names))[:, 0])
+        table = values.view(table_dtype(list(headings)))[:, 0]
+        meant = {name: meant_unit(unit) for name, unit in headings.items() if unit is not None}
+        convert(table, {name: unit for name, unit in meant.items() if unit is not None})
+        return bare(table)

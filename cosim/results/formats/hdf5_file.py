@@ -144,8 +144,9 @@ def _columns(file: Any, rows: int, chunk: int, signals: Sequence[SignalInfo]) ->
         dataset.attrs["description"] = signal.description
         if signal.description:
             dataset.attrs["long_name"] = signal.description  # as xarray calls it
-        if signal.display_unit is not None:
-            dataset.attrs["display_unit"] = signal.display_unit
+        for key in ("display_unit", "declared_unit"):
+            if getattr(signal, key) is not None:
+                dataset.attrs[key] = getattr(signal, key)
         if name != signal.name:
             dataset.attrs["name"] = signal.name
         datasets.append(dataset)
@@ -190,6 +191,7 @@ def _signal(dataset: Any) -> SignalInfo:
         known.get("display_unit"),
         "discrete" if known["variability"] == "discrete" else "continuous",
         known["description"] or "",
+        declared_unit=known.get("declared_unit"),
     )
 
 

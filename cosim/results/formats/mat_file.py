@@ -104,6 +104,7 @@ def _read_signals(struct: Mapping[str, Any]) -> tuple[list[str], list[SignalInfo
             **{
                 **row,
                 "display_unit": row["display_unit"] or None,
+                "declared_unit": row.get("declared_unit") or None,
                 "can_be_missing": row.get("can_be_missing") == str(True),
             }
         )

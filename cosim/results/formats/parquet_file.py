@@ -32,7 +32,8 @@ def _modules() -> tuple[Any, Any]:
 
 def _metadata(signal: SignalInfo) -> dict[str, str]:
     known = {"unit": signal.unit, "variability": signal.variability, "description": signal.description}
-    return known | ({} if signal.display_unit is None else {"display_unit": signal.display_unit})
+    more = {"display_unit": signal.display_unit, "declared_unit": signal.declared_unit}
+    return known | {name: unit for name, unit in more.items() if unit is not None}
 
 
 def _ours(file: Any, about: str) -> ResultData:
@@ -48,7 +49,7 @@ def _ours(file: Any, about: str) -> ResultData:
 
 def _signal(field: Any) -> SignalInfo:
     known = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-    kept = {key: known[key] for key in ("display_unit", "variability", "description") if key in known}
+    kept = {key: known[key] for key in ("display_unit", "declared_unit", "variability", "description") if key in known}
     return SignalInfo(field.name, known.get("unit") or known.get("units") or "1", **kept)
 
 

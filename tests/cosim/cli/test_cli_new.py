@@ -20,7 +20,7 @@ def test_what_is_written_runs_from_the_command_line(
     monkeypatch.chdir(tmp_path)
     assert main(["new", "point.fmu"]) == 0
     said = capsys.readouterr().out
-    assert "position: position (likely, by its name)" in said
+    assert "position: position, m (d(position)/dt = 1 speed)" in said
     assert "wheel speed: not found" in said
     assert "written: point.toml" in said
     assert main(["show", "point.toml"]) == 0
@@ -30,7 +30,7 @@ def test_what_is_written_runs_from_the_command_line(
     assert (
         "point.toml exists already; choose another name with -o, or replace it with --force" in capsys.readouterr().err
     )
-    assert main(["new", "point.fmu", "--force", "--observer", "discrete_uio"]) == 0
+    assert main(["new", "point.fmu", "--force", "--no-probe", "--observer", "discrete_uio"]) == 0
     assert 'observer = "discrete_uio"' in Path("point.toml").read_text()
     assert main(["new", "point.fmu", "-o", "Zug & Öl.toml"]) == 0
     assert "then: cosim run 'Zug & Öl.toml'" in capsys.readouterr().out
