@@ -25,7 +25,8 @@ from cosim.evaluation.fault_table import fault_table
 from cosim.expectations.evaluated import evaluated_table
 from cosim.process.last_call import LAST_CALL
 from cosim.results.results_folder import check_writable
-from cosim.results.unfinished import UNFINISHED
+from cosim.results.salvage import left_rows, rescue
+from cosim.results.unfinished import UNFINISHED, only_run
 from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
 from cosim.studies.warnings_of_runs import PAGE, warning_lines
@@ -165,7 +166,7 @@ def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, cal
     directory = results.directory
     bar = simulated_time_bar(silent=options.quiet or options.json)
     try:
-        with _kept(directory, options.stream, scenario.table().report.tables) as fallback:
+        with only_run(directory), _kept(results, options.stream, scenario.table().report.tables) as fallback:
             scenario.run(
                 progress=bar,
                 call_log=call_log,
@@ -179,10 +180,13 @@ def _run(scenario: Scenario, options: argparse.Namespace, results: _Results, cal
 
 
 @contextmanager
-def _kept(directory: Path, streamed: bool, formats: Sequence[str]) -> Iterator[Path | None]:
+def _kept(results: _Results, streamed: bool, formats: Sequence[str]) -> Iterator[Path | None]:
     """Who watches this process learns what to keep should it die; yields the folder to stream to for that, if one is
-    needed.
+    needed. It goes when the results stand, and not before.
     """
+    directory = results.directory
+    if words := rescue(directory):
+        LOG.warning("%s", words)
     if not LAST_CALL.watched:
         yield None
         return
@@ -190,9 +194,14 @@ def _kept(directory: Path, streamed: bool, formats: Sequence[str]) -> Iterator[P
     LAST_CALL.note(json.dumps({"fallback": str(fallback), "out": str(directory), "formats": list(formats)}))
     try:
         yield None if streamed else fallback
+    except OutputError as error:
+        if rows := left_rows(directory):
+            where = f"{rows} rows are kept in {fallback}; to see them: cosim report {directory}"
+            raise OutputError(f"{error} {where}") from error
+        raise
     finally:
-        if not streamed:
-            shutil.rmtree(fallback, ignore_errors=True)
+        if results.paths:
+            shutil.rmtree(directory / UNFINISHED, ignore_errors=True)
         LAST_CALL.note("")
 
 

@@ -67,14 +67,16 @@ def _run(command: Callable[[], int], parent: int) -> int:
 
 
 def _end_with(parent: int) -> None:
-    """When the process that watches is gone, this one is asked to end too: Linux only."""
+    """When the process that watches is gone, this one ends too, whatever an FMU is doing: Linux only. What was recorded
+    lies in the folder that is streamed to, and is found there.
+    """
     if sys.platform != "linux":
         return
     import ctypes  # noqa: PLC0415 - the watching process does without
 
-    ctypes.CDLL(None).prctl(_PARENT_DEATH, signal.SIGTERM, 0, 0, 0)
+    ctypes.CDLL(None).prctl(_PARENT_DEATH, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
-        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 class _Watch:

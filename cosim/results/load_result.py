@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -17,7 +18,10 @@ from cosim.results.record_rows import EVENTS_SUFFIX, TELEGRAM_ROWS
 from cosim.results.result import Result
 from cosim.results.result_data import ResultData
 from cosim.results.results_folder import SUMMARY, read_results
+from cosim.results.unfinished import UNFINISHED
 from fmus.near_files import near_files
+
+LOG = logging.getLogger(__name__)
 
 _NO_RESULTS = {
     ".toml": "a scenario, which 'cosim run' runs",
@@ -75,8 +79,13 @@ def _named(source: Path, text: str) -> str:
 
 
 def _folder(folder: Path) -> ResultData:
+    left = folder / UNFINISHED
     if (folder / SUMMARY).is_file():
+        if (left / SUMMARY).is_file():
+            LOG.warning("%s: these are former results; a later run that has not ended is in %s.", folder, left)
         return read_results(folder)
+    if (left / SUMMARY).is_file():
+        return read_results(left)
     tables = [name for name in table_files().values() if (folder / name).is_file()]
     if tables:
         raise OutputError(

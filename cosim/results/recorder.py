@@ -25,6 +25,7 @@ from cosim.results.table_layout import table_dtype
 MEMORY = 256e6  # rows stay in memory up to this size [bytes]
 BLOCK = 4e6  # rows gathered before each writing to the file [bytes]
 _FIRST_ROWS = 16
+_FIRST_BLOCK = 512  # rows of a stream at least: a chunk of the compiled stepper has room for its events
 
 
 class RowStream(Protocol):
@@ -97,19 +98,25 @@ class Recorder:
         self._block: BlockFile | None = None
         # first row and rows of the block, kept where they outlive the process if it is a stream's
         self._filled: Any = [0, 0]
+        room = min(max(expected_rows // every + 1, _FIRST_ROWS), self._limit)
         if stream is None:
-            self._use(np.empty((min(max(expected_rows // every + 1, _FIRST_ROWS), self._limit), self._width)))
+            self._use(np.empty((room, self._width)))
         else:
-            self._use_stream(stream)
+            self._use_stream(stream, max(room, _FIRST_BLOCK))
 
-    def _use_stream(self, stream: RowStream) -> None:
-        """Keep rows where they outlive the process."""
-        self._limit = max(min(int(BLOCK // self._dtype.itemsize), self._limit), _FIRST_ROWS)
+    def _use_stream(self, stream: RowStream, room: int) -> None:
+        """Keep rows where they outlive the process: in blocks of at most `room`, for which the disk reserves space."""
+        self._limit = max(min(int(BLOCK // self._dtype.itemsize), self._limit, room), _FIRST_ROWS)
         self._file = stream.open(self._dtype, self._limit)
         self._seconds, self._due = stream.seconds, monotonic() + stream.seconds
         self._block = stream.block(self._limit)
         self._filled = self._block.cells
         self._use(self._block.rows[:1])
+
+    @property
+    def room(self) -> int:
+        """How many rows the memory takes as it is."""
+        return len(self._rows)
 
     @property
     def count_address(self) -> int | None:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from typing import Any
 
-from cosim.errors import CosimError
+from cosim.errors import CosimError, OutputError
 from cosim.results.block_file import BLOCK_FILE, read_block
 from cosim.results.formats.growing_npy import growing_header, read_grown
 from cosim.results.formats.known_formats import usual_file
 from cosim.results.results_folder import SUMMARY, read_results, remove_report, write_results
 from cosim.results.summary_file import read_summary, write_summary
-from cosim.results.unfinished import DID_NOT_END
+from cosim.results.unfinished import DID_NOT_END, UNFINISHED
 
 
 def salvage(note: Mapping[str, Any], reason: str) -> str:
@@ -44,6 +46,43 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
     if fallback != out:
         shutil.rmtree(fallback, ignore_errors=True)
     return f"What was computed is kept: {len(result.table)} rows in {out}. To see it: cosim report {out}"
+
+
+def rescue(directory: Path) -> str:
+    """Move what an earlier run left that was ended together with whoever watched it, into a results folder of its own.
+
+    Args:
+        directory: results folder, to which nobody writes at present.
+
+    Returns:
+        What to say to the user; empty where nothing was left.
+    """
+    left = directory / UNFINISHED
+    try:
+        rows = left_rows(directory)
+        if not rows:
+            return ""
+        kept = next(p for k in count(1) if not (p := directory.with_name(f"{directory.name}-unfinished-{k}")).exists())
+        left.rename(kept)
+        _close_unfinished(kept, "its program was ended from outside")
+    except (CosimError, OSError, ValueError) as error:
+        return f"What an earlier run left in {left} cannot be read, and is replaced: {error}"
+    return f"An earlier run to {directory} was ended from outside: its {rows} rows are kept in {kept}."
+
+
+def left_rows(directory: Path) -> int:
+    """How many rows a run left in a results folder that were not written as results; where there are none, what else it
+    left goes.
+
+    Args:
+        directory: results folder, to which nobody writes at present.
+    """
+    left, rows = directory / UNFINISHED, 0
+    with suppress(OutputError):  # it had no table yet
+        rows = len(read_results(left).table)
+    if not rows:
+        shutil.rmtree(left, ignore_errors=True)
+    return rows
 
 
 def _close_unfinished(folder: Path, reason: str) -> None:

@@ -14,6 +14,7 @@ from cosim.components.start_values import StartValue
 from cosim.coupling.instants import followed
 from cosim.coupling.plan import Plan, make_plan
 from cosim.diagnostics.call_log import CallLog
+from cosim.errors import OutputError
 from cosim.master.interpolation.attach import attach_interpolators
 from cosim.master.master import Master, close
 from cosim.results.stream import Stream
@@ -188,16 +189,24 @@ def _instantiate_components(
 
 def _begin_stream(
     streaming: Streaming, checked: Checked, services: Services, master: Master, remarks: Remarks
-) -> Stream:
-    """From here on what is recorded, delivered and logged is in the folder as well."""
+) -> Stream | None:
+    """From here on what is recorded, delivered and logged is in the folder as well; nothing is, where a spare folder
+    cannot be made.
+    """
     table, signals = checked.task.table, master.plan.signals
     summary = first_summary(checked.task, master.plan) | {"report": asdict(report_spec(table))}
     summary |= {"certificates": checked.certificates, "warnings": remarks.warnings, "notes": remarks.notes}
     events = [] if services.balises is None else services.balises.mailbox.log
     logs = [component.messages for component in checked.coupled.components.values()]
-    folder, begun = streaming
     packets = None if services.packets is None else services.packets.settled
-    stream = Stream(folder, signals, checked.coupled.unit, summary, lambda: events, logs, packets)
-    master.recorder = make_recorder(table, signals, 0, stream)
-    begun()
+    rows = table.master.record_every * master.recorder.room
+    try:
+        stream = Stream(streaming.folder, signals, checked.coupled.unit, summary, lambda: events, logs, packets)
+        master.recorder = make_recorder(table, signals, rows, stream)
+    except OutputError as error:
+        if not streaming.spare:
+            raise
+        remarks.warn(f"Until its end the run is in memory alone, lost if its process dies: {error}")
+        return None
+    streaming.begun()
     return stream

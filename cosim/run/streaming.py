@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from cosim.errors import OutputError
 from cosim.results.results_folder import check_writable
@@ -15,8 +15,18 @@ if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
     from cosim.scenario.origin import Origin
 
-Streaming = tuple[Path, Callable[[], None]]
-"""The folder to stream to, and what is called once this has begun: nothing of a former run is in it then."""
+
+class Streaming(NamedTuple):
+    """What a run needs to stream.
+
+    Attributes:
+        folder: to stream to. begun: called once this has begun: nothing of a former run is in the folder then.
+        spare: the results do not need it; where it cannot be made the run goes on in memory.
+    """
+
+    folder: Path
+    begun: Callable[[], None]
+    spare: bool = False
 
 
 def _streaming_to(directory: str | Path, origin: Origin) -> Streaming:
@@ -26,7 +36,7 @@ def _streaming_to(directory: str | Path, origin: Origin) -> Streaming:
         with renewed(directory, origin) as seal:
             seal({}, {})
 
-    return check_writable(directory), begun
+    return Streaming(check_writable(directory), begun)
 
 
 def where_to(
@@ -44,7 +54,7 @@ def where_to(
     if stream is not None:
         folder = Path(stream).absolute()  # an FMU may change the working directory
         return folder, _streaming_to(folder, origin)
-    return None, None if fallback is None else (Path(fallback).absolute(), lambda: None)
+    return None, None if fallback is None else Streaming(Path(fallback).absolute(), lambda: None, spare=True)
 
 
 def ending(

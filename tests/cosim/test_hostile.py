@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import errno
 import locale
 import math
 import mmap
@@ -12,7 +13,7 @@ import subprocess
 import sys
 import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +24,13 @@ from cosim import CosimError, Scenario, load_result
 from cosim.cli import main
 from cosim.compiled.library import _stepper_library
 from cosim.components.loading import FMI2Component
+from cosim.errors import OutputError
 from cosim.process import exit_guard, watch
 from cosim.process.interruption import STOPPING, ends_like_ctrl_c
 from cosim.process.last_call import LAST_CALL, PAGE, TEXTS, USED, LastCall, make_page
+from cosim.results import row_file
+from cosim.results.salvage import rescue
+from cosim.results.unfinished import only_run
 from cosim.runs.run import Run
 from cosim.runs.workers import Team
 from fmus import cache
@@ -247,6 +252,53 @@ def test_ctrl_c_works_while_an_fmu_hangs(fmu: Path, tmp_path: Path, number: sign
     process.send_signal(number)
     assert "component 'bad' in doStep at t = 0.24 s does not return; the run was interrupted" in reported(process)
     assert len(load_result(tmp_path / "out").table) == 25
+
+
+@pytest.mark.parametrize("end", [lambda process: os.killpg(process.pid, signal.SIGKILL), subprocess.Popen.kill])
+def test_rows_of_a_run_that_is_killed_with_who_watches_it_are_read_and_kept(
+    fmu: Path, tmp_path: Path, end: Callable[[subprocess.Popen[str]], None]
+) -> None:
+    """Killed as a group, or the watch alone, which takes the process along in which the FMU hangs."""
+    process, out = start(fmu, tmp_path, "hangs", stepper="python"), tmp_path / "out"
+    while not (out / ".unfinished" / "table.npy").exists() and process.poll() is None:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    with pytest.raises(OutputError, match=r"Another run is writing to .*: wait for its end"), only_run(out):
+        pass
+    end(process)
+    process.communicate(timeout=60)
+    time.sleep(0.2)
+    with only_run(out):
+        assert len(load_result(out).table) == 25
+        assert rescue(out).endswith(f"was ended from outside: its 25 rows are kept in {out}-unfinished-1.")
+        assert rescue(out) == ""
+    kept = load_result(f"{out}-unfinished-1")
+    assert len(kept.table) == 25
+    assert "its program was ended from outside" in str(kept.failure)
+
+
+def test_former_results_are_not_taken_for_those_of_a_run_that_did_not_end(
+    fmu: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    hostile(fmu, "nothing").run().write(tmp_path, report=False)
+    hostile(fmu, "nothing").run(stream=tmp_path / ".unfinished")
+    assert len(load_result(tmp_path).table) == 51
+    assert "these are former results; a later run that has not ended is in" in caplog.text
+
+
+def test_a_disk_without_room_for_the_spare_rows_costs_their_safety_and_not_the_run(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(row_file, "allocate", full)
+    warnings: list[str] = []
+    outcome = hostile(fmu, "nothing").run(fallback=tmp_path / ".unfinished", warn=warnings.append)
+    assert len(outcome.result.table) == 51
+    assert any("in memory alone" in text and "No space left on device" in text for text in warnings)
+    with pytest.raises(OutputError, match="No space left on device"):
+        hostile(fmu, "nothing").run(stream=tmp_path / "asked")
 
 
 @pytest.mark.parametrize("stepper", ["python", "compiled"])
