@@ -71,6 +71,7 @@ LINES = {
         "build": "build driver -o OUT",
         "check": "check LAG.fmu -o OUT.json",
         "check of what lies": "check BROKEN.fmu",
+        "compile": "compile SOURCE.fmu",
         "info": "info LAG.fmu",
         "info of what is damaged": "info BROKEN.fmu",
         "list": "list",
@@ -100,6 +101,9 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     lag = linear_fmu(folder, "LAG", [[-1.0]], [[1.0]], [[1.0]], [[0.0]], version=2, x0=[1.0])
     with zipfile.ZipFile(shutil.copy(lag, folder / "BROKEN.fmu"), "a") as archive:
         archive.writestr("binaries/linux64/OTHER.so", b"not a library")
+    with zipfile.ZipFile(lag) as whole, zipfile.ZipFile(folder / "SOURCE.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
+        archive.writestr("sources/version.c", 'const char *fmi2GetVersion(void) { return "2.0"; }')
     for line in (
         "run TRAIN.toml --no-report --quiet --out RESULTS",
         "run heavy.toml --no-report --quiet --out OTHER",
