@@ -37,7 +37,7 @@ class SealedFmu:
 
     Args:
         path: of the file. interface: None for co-simulation where the FMU has it. parameters: start values by name, in
-            an order. call_timeout: how long a call of it may last [s]; None for any time.
+            an order. call_timeout: how long a call of it may last [s]; inf for any time, None for ten minutes.
     """
 
     path: str

@@ -29,7 +29,7 @@ class FmuRuns(JobRuns):
         fixed: other start values by name. guesses: first guesses by name, where the FMU's own are not wanted.
         interface: ``co-simulation`` or ``model-exchange``; None for co-simulation where the FMU has it.
         step: longest communication step [s]; None for the sampling of the recording.
-        call_timeout: how long a call of the FMU may last [s]; None for any time.
+        call_timeout: how long a call of the FMU may last [s]; inf for any time, None for ten minutes.
         workers, scheduler: where it is run, see `make_executor`.
         journal: that runs are written to and taken over from; None for none.
 

@@ -19,6 +19,8 @@ from cosim.process.last_call import LAST_CALL
 
 ERROR = 2
 _ENDING = 30.0
+_CALL = 600.0
+"""Longest times of a call where nothing else is said [s]: one that ends an FMU after the run, and any other."""
 _output = [2]
 
 
@@ -62,17 +64,18 @@ def _exit_called() -> None:
 
 @contextmanager
 def limited_calls(seconds: float | None, *, ends: bool = False) -> Iterator[None]:
-    """Within this context a call may last so long [s]; None for any time. A process that does not return is ended with
-    code 2. Afterwards the limit of before holds.
+    """Within this context a call may last so long. A process that does not return is ended with code 2. Afterwards the
+    limit of before holds.
 
     Args:
-        seconds: longest time a call may take [s]; None for any.
+        seconds: longest time a call may take [s]; inf for any, None for ten minutes.
         ends: these are calls that end FMUs, before which everything was written: None stands for half a minute.
     """
-    seconds = _ENDING if seconds is None and ends else seconds
+    if seconds is None:
+        seconds = _ENDING if ends else _CALL
     before, over = LAST_CALL.seconds_at_most, threading.Event()
     LAST_CALL.limit(seconds)
-    if seconds is not None and not LAST_CALL.timed and not before:  # else somebody keeps the time already
+    if not LAST_CALL.timed and not before:  # else somebody keeps the time already
         threading.Thread(target=_keep_time, args=(seconds, over), daemon=True).start()
     try:
         yield
