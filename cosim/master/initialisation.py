@@ -73,13 +73,16 @@ def initialise(plan: Plan, start_time: float, stop_time: float, initialised: Cal
     plan.begin_step()
     for step in plan.steps:
         if step.interpolator is not None:
-            step.interpolator.prepare(start_time)  # where its lines begin
-            _demand_arrivals(exchange, step)
+            _begin_lines(exchange, step, start_time)
     return rounds
 
 
-def _demand_arrivals(exchange: ExchangeAtInstant, step: PlannedComponent) -> None:
-    """Whether a component may be set and read where its steps end; of one that refuses that outputs show the mean."""
+def _begin_lines(exchange: ExchangeAtInstant, step: PlannedComponent, start_time: float) -> None:
+    """Where the lines of its inputs begin, and whether it may be set and read where its steps end: of a component that
+    refuses that outputs show the mean.
+    """
+    assert step.interpolator is not None
+    step.interpolator.prepare(start_time)
     passes = getattr(step.interpolator, "passes", None)
     if passes is None or not passes.any():
         return

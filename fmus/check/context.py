@@ -98,9 +98,10 @@ class Context:
         """A runner that has not been stepped to find an excitation; the caller puts it away."""
         if self.only_once and "runner" in self.__dict__:
             self.runner.park()
-        return Runner(
-            self.slave, self.starts, self.start_time, self.step, until=self.start_time + self.steps * self.step
-        )
+        until = self.start_time + self.steps * self.step
+        runner = Runner(self.slave, self.starts, self.start_time, self.step, until=until)
+        runner.patience = SHARE_OF_BUDGET * self.budget
+        return runner
 
     @contextmanager
     def begun_runner(self) -> Iterator[Runner]:

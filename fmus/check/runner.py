@@ -48,6 +48,7 @@ class Runner(AbstractContextManager["Runner"]):
     ) -> None:
         self._make, self.starts, self.t0, self.h = make, starts, start_time, h
         self.component = make() if component is None else component
+        self.patience = np.inf  # how long steps whose number matters little may take together [s]
         self.end = max(end_of_experiment(self.component.description, start_time), until or start_time)
         self.amplitude, self.spread, self.now = 0.0, 0.0, start_time
         self.excited: bool | None = None
@@ -188,13 +189,14 @@ class Runner(AbstractContextManager["Runner"]):
         return rows
 
     def steps_at_most(self, count: int) -> int:
-        """Steps of the usual length from where the instance stands, as many as it does before it asks for the end.
+        """Steps of the usual length from where the instance stands, as many as it does before it asks for the end, and
+        as there is `patience` for.
 
         Args:
             count: the most to make.
         """
-        done = 0
-        while done < count and not self.component.terminated:
+        done, since = 0, perf_counter()
+        while done < count and not self.component.terminated and perf_counter() - since < self.patience:
             done += len(self.step(self.h))
         return done
 

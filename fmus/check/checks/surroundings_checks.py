@@ -61,7 +61,7 @@ class WrittenFilesCheck(
         return passed("it writes no file")
 
 
-class MemoryOfStepsCheck(Check, failing=LIMIT, advice="keep runs short: memory ends before a long one does", place=5.5):
+class MemoryOfStepsCheck(Check, failing=LIMIT, advice="keep runs short: a long one runs out of memory", place=6.05):
     """Steps take no more and more memory, used or only reserved."""
 
     name = "memory of steps"
