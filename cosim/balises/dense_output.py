@@ -71,11 +71,7 @@ class DenseOutputLocaliser(RollbackLocaliser):
             place = self._stood[0]
         part = _Part(self, begin, HermiteStep(end - begin, place, speed, *ahead), solver)
         self._stood, self._at = ahead, end
-        if isinstance(self.layout, InstantLayout):
-            found = [(instant, None) for instant in self.layout.within(begin, end)]
-        else:
-            found = part.crossings(self.layout)
-        for stamp, balise in found:
+        for stamp, balise in part.crossings(self.layout):
             part.go(stamp)
             self._found.append((self.crossing(stamp, balise, *watch.motion), watch.outputs.copy()))
 

@@ -60,12 +60,14 @@ class StepSearch(ABC):
         """Put the plant at `time` [s] within the step, with the inputs it had."""
 
     def crossings(self, layout: TrackLayout | InstantLayout) -> list[tuple[float, Balise | None]]:
-        """Instants [s] within the step at which balises of a track are passed, in order, each with its balise.
+        """Instants [s] within the step at which balises are passed, in order, each with its balise; without one where
+        they are placed by instant.
 
         Args:
-            layout: of the balises; those by instant are not searched.
+            layout: of the balises.
         """
-        assert isinstance(layout, TrackLayout)
+        if isinstance(layout, InstantLayout):
+            return [(instant, None) for instant in layout.within(self.t, self.t + self._hermite.h)]
         return [
             (self.t + self.search(balise.position, part), balise)
             for part in self.parts()

@@ -8,7 +8,7 @@ import os
 import shutil
 import struct
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -234,12 +234,7 @@ def load_fmu(
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
     guard_exit()
-    here, before = Path.cwd(), Surroundings()
-    try:
-        folder, slave = _unpacked_and_loaded(archive, path, name, kind)
-    finally:
-        os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
-        changed = before.put_back()
+    folder, slave, changed = _loaded_in_peace(archive, path, name, kind)
     more = {"negated": negated_aliases(folder)} if fmi_version(description) == 1 else {}
     component: Component = COMPONENTS[fmi_version(description)](
         name,
@@ -255,6 +250,22 @@ def load_fmu(
     if kind != CO_SIMULATION:  # the solver is here, for FMI 1 too, and needs one
         component.tolerance = component.tolerance or (tolerance if isinstance(tolerance, float) else TOLERANCE)
     return component
+
+
+def _loaded_in_peace(archive: Archive, path: Path, name: str, kind: str) -> tuple[Path, Any, Sequence[str]]:
+    """As `_unpacked_and_loaded`, and what the library changed for the whole process when it was loaded; it is put back.
+
+    Args:
+        kind: interface type that is stepped.
+    """
+    here, before = Path.cwd(), Surroundings()
+    changed: Sequence[str] = ()
+    try:
+        folder, slave = _unpacked_and_loaded(archive, path, name, kind)
+    finally:
+        os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
+        changed = before.put_back()
+    return folder, slave, changed
 
 
 def _unpacked_and_loaded(archive: Archive, path: Path, name: str, kind: str) -> tuple[Path, Any]:

@@ -37,7 +37,7 @@ WHOLE = 1e-6
 """Share of a step by which an end may miss a whole number of steps."""
 
 _UNRUNNABLE = (f"{LOADING} failed", f"{INSTANTIATING} failed")
-_NO_SLAVE = "there is no co-simulation: this package's master cannot step it"
+_NO_SLAVE = "there is no co-simulation: a master needs a solver for it, as cosim has; such steps are not checked here"
 _STATIC = {"validation": validation, "platforms": platforms}
 
 
@@ -168,7 +168,11 @@ def _run_findings(archive: Archive, job: CheckJob, progress: Callable[[str], Non
     _demand_runnable(archive, findings)
     findings += [CheckFinding(name, Verdict.NOTE, f"left out: {reason}") for name, reason in left_out.items()]
     if CO_SIMULATION not in archive.interfaces:
-        findings.append(CheckFinding("interface", Verdict.LIMIT, _NO_SLAVE, "integrate it with a solver of your own"))
+        findings.append(
+            CheckFinding(
+                "interface", Verdict.LIMIT, _NO_SLAVE, "step it where a solver is: cosim run, or one of your own"
+            )
+        )
     return findings
 
 

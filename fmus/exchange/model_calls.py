@@ -33,6 +33,16 @@ class EventIteration:
     terminate: bool
     next_event: float
 
+    @classmethod
+    def of_first(cls, info: fmi1EventInfo) -> EventIteration:
+        """What FMI 1 says of an event.
+
+        Args:
+            info: as filled by the FMU.
+        """
+        due = info.nextEventTime if info.upcomingTimeEvent != b"\x00" else NEVER
+        return cls(info.iterationConverged == b"\x00", info.terminateSimulation != b"\x00", due)
+
 
 class ModelCalls:
     """Calls of one instance. Arrays are ctypes arrays of doubles; a status above a warning raises `FMICallException`.
@@ -102,7 +112,7 @@ class ModelCalls:
         """Magnitudes of the states, shape (n,), at least one; 1 where the FMU says nothing that is one."""
         found = np.ones(max(self.state_count, 1))
         if self.state_count:
-            array = (ctypes.c_double * self.state_count).from_buffer(found)
+            array = (ctypes.c_double * self.state_count).from_address(found.ctypes.data)
             self._done(self._get_nominals, array, self.state_count)
         return np.where(np.isfinite(found) & (found != 0.0), np.abs(found), 1.0)
 
@@ -121,7 +131,7 @@ class ModelCalls:
         if self._version == 1:
             info = fmi1EventInfo()
             self.call("EventUpdate", b"\x00", ctypes.byref(info))
-            return first_update(info)
+            return EventIteration.of_first(info)
         if self._version == 2:
             said = fmi2EventInfo()
             self.call("NewDiscreteStates", ctypes.byref(said))
@@ -192,13 +202,3 @@ class ModelCalls:
             return 0
         self.failed = FMICallException(call.whole, status)  # type: ignore[attr-defined]
         return 1 if status == DISCARD else -1
-
-
-def first_update(info: fmi1EventInfo) -> EventIteration:
-    """What FMI 1 says of an event.
-
-    Args:
-        info: as filled by the FMU.
-    """
-    due = info.nextEventTime if info.upcomingTimeEvent != b"\x00" else NEVER
-    return EventIteration(info.iterationConverged == b"\x00", info.terminateSimulation != b"\x00", due)

@@ -27,7 +27,7 @@ Part = Callable[[float, float], None]
 """Called when the solver has taken an internal step, with its begin and its end [s]."""
 
 
-class StepEnd(NamedTuple):
+class _StepEnd(NamedTuple):
     """Where a step ended.
 
     Attributes:
@@ -107,7 +107,7 @@ class Motion:
 
     # -- time -------------------------------------------------------------------------------------------------------
 
-    def advance(self, t: float, until: float) -> StepEnd:
+    def advance(self, t: float, until: float) -> _StepEnd:
         """To the end of a communication step, events on the way handled.
 
         Args:
@@ -120,14 +120,14 @@ class Motion:
             if self.in_event_mode:
                 self.settle()
                 if self.terminated:
-                    return StepEnd(t, event=False, terminate=True)
+                    return _StepEnd(t, event=False, terminate=True)
             t, event, terminate = self.to_event(t, until)
             if terminate or not event:
-                return StepEnd(t, event=False, terminate=terminate)
+                return _StepEnd(t, event=False, terminate=terminate)
             self.enter_event_mode()
         raise SolverError(f"at t = {t:.12g} s: {MAX_RETURNS_PER_STEP} events in one communication step")
 
-    def to_event(self, t: float, until: float) -> StepEnd:
+    def to_event(self, t: float, until: float) -> _StepEnd:
         """To the first event, which is not handled, or the end of the step.
 
         Args:
@@ -138,22 +138,22 @@ class Motion:
             if stop - t > _ROUNDING * max(abs(t), abs(stop)) * 2.0:
                 t, event, terminate = self._internal_step(t, stop)
                 if terminate:
-                    return StepEnd(t, event, terminate)
+                    return _StepEnd(t, event, terminate)
             elif stop > t:
                 t = stop
                 self._model.set_time(t)
             if event or self.next_event <= t + _ROUNDING * max(abs(t), 1.0):
                 self._count_event(t)
-                return StepEnd(t, event=True, terminate=False)
+                return _StepEnd(t, event=True, terminate=False)
             if t >= until - _ROUNDING * max(abs(until), 1.0):
-                return StepEnd(until, event=False, terminate=False)
+                return _StepEnd(until, event=False, terminate=False)
         raise SolverError(f"at t = {t:.12g} s: the solver takes more than {MOST_STEPS} steps in one communication step")
 
     def look(self, t: float) -> None:
         """Put the FMU at an instant within the last internal step [s], in states from the solver's polynomial."""
         self._model.move(t, self.solver.address(self.solver.between(t)))
 
-    def _internal_step(self, t: float, stop: float) -> StepEnd:
+    def _internal_step(self, t: float, stop: float) -> _StepEnd:
         model, solver = self._model, self.solver
         try:
             if self._anew:
@@ -169,7 +169,7 @@ class Motion:
             self.follower(t, reached)
             model.move(reached, self._x)
         wanted, terminate = model.completed()
-        return StepEnd(reached, root or wanted, terminate)
+        return _StepEnd(reached, root or wanted, terminate)
 
     def _explained(self, error: SolverError, t: float) -> SolverError:
         """The solver's words with time and state, or those of the FMU where it refused what the solver asked."""

@@ -21,7 +21,7 @@ from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 from fmpy.model_description import ModelDescription
 
 from fmus.exchange.cvode import SolverError
-from fmus.exchange.model_calls import EventIteration, ModelCalls, first_update
+from fmus.exchange.model_calls import EventIteration, ModelCalls
 from fmus.exchange.motion import Motion, Part
 from fmus.fmi.elements import elements_of
 from fmus.fmi.standard import DISCARD, ERROR, NEVER, OK, WARNING, Method, fmi_version
@@ -133,7 +133,7 @@ class CoSimulationFunctions:
         slave.fmi1Initialize(slave.component, b"\x00", 0.0, ctypes.byref(info))
         self._start = tStart
         self._begin()
-        if self._motion.note(first_update(info)):
+        if self._motion.note(EventIteration.of_first(info)):
             self._motion.settle()
         else:
             self._motion.leave_event_mode()

@@ -1,0 +1,101 @@
+"""Benchmark: what a step of a model exchange FMU costs as a component, against fmpy's own simulation of it.
+
+Sections: ``steps`` (a communication step of 10 ms of the locomotive, FMI 2 and 3, inputs held and inputs that jump at
+every step, against fmpy's CVode and the same FMU's co-simulation), ``beside`` (a run with an observer, by each
+stepper).
+
+Run it with ``python tests/benchmarks/exchange.py [SECTION ...]``; without a section, all of them. Nothing is asserted.
+A further section is a function in `SECTIONS` that prints.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from time import process_time
+from typing import Literal
+
+import fmpy
+from cpu_time import run_sections
+
+from cosim import Scenario
+from cosim.components.loading import load_fmu
+from fmus import build_fmu
+from fmus.fmi.standard import Interface
+from plant_models import Locomotive
+
+STEP, COUNT, TOLERANCE = 0.01, 2000, 1e-6
+STARTS = {"train_speed": 1.0, "wheel_rate": 1.0 / 0.575}
+
+
+def stepped(path: Path, interface: Interface, *, jumps: bool) -> float:
+    """Processor time of a communication step [s]."""
+    component = load_fmu(path, "plant", TOLERANCE, interface=interface)
+    component.instantiate()
+    for name, value in STARTS.items():
+        component.set_start(name, value)
+    component.enter_initialization(0.0, COUNT * STEP)
+    write, effort = component.writer(["effort"])
+    effort[0] = 50e3
+    write()
+    component.exit_initialization()
+    begin = process_time()
+    for k in range(COUNT):
+        effort[0] += 1.0 if jumps else 0.0
+        write()
+        component.advance(k * STEP, (k + 1) * STEP)
+    spent = process_time() - begin
+    component.terminate()
+    component.free()
+    return spent / COUNT
+
+
+def simulated(path: Path) -> float:
+    """The same by fmpy's CVode, the input held [s]."""
+    begin = process_time()
+    fmpy.simulate_fmu(
+        str(path),
+        fmi_type="ModelExchange",
+        solver="CVode",
+        relative_tolerance=TOLERANCE,
+        stop_time=COUNT * STEP,
+        output_interval=STEP,
+        start_values=STARTS | {"effort": 50e3},
+    )
+    return (process_time() - begin) / COUNT
+
+
+def steps() -> None:
+    """A communication step, and its ratio to fmpy's."""
+    with tempfile.TemporaryDirectory() as folder:
+        versions: tuple[Literal[2, 3], ...] = (2, 3)
+        for version in versions:
+            path = build_fmu(Locomotive(), Path(folder) / f"locomotive{version}.fmu", fmi_version=version)
+            reference = simulated(path)
+            print(f"FMI {version}: fmpy {1e6 * reference:.0f} us a step")
+            for interface, jumps in (("model-exchange", False), ("model-exchange", True), ("co-simulation", True)):
+                spent = stepped(path, interface, jumps=jumps)  # type: ignore[arg-type]
+                inputs = "jump at each step" if jumps else "held"
+                print(f"  {interface}, inputs {inputs}: {1e6 * spent:.0f} us, {spent / reference:.2f} of fmpy")
+
+
+def beside() -> None:
+    """A run with an observer, by each stepper."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = build_fmu(Locomotive(), Path(folder) / "locomotive.fmu", fmi_version=2)
+        for stepper in ("python", "compiled"):
+            for interface in ("model-exchange", "co-simulation"):
+                s = Scenario(stop=20.0, step=STEP).add("train", fmu=str(path), interface=interface, parameters=STARTS)
+                s = s.add("observer", observer="odometer_reset").connect("train.wheel_speed -> observer.odometer")
+                s = s.set("master.stepper", stepper)
+                begin = process_time()
+                s.run()
+                print(f"{stepper}, {interface}: {process_time() - begin:.2f} s for 20 s")
+
+
+SECTIONS: dict[str, Callable[[], None]] = {"steps": steps, "beside": beside}
+
+
+if __name__ == "__main__":
+    run_sections(SECTIONS)

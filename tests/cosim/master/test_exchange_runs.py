@@ -1,0 +1,82 @@
+"""Runs with model exchange FMUs: beside their own co-simulation, by either stepper, by their keys in a scenario."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import fmpy
+import numpy as np
+import pytest
+from test_fmus.exchange import exchange_fmu
+
+import fmus
+from cosim import CosimError, Outcome, Scenario
+from fmu_observer import OBSERVERS
+from plant_models import Locomotive
+
+MOVING = {"train_speed": 10.0, "wheel_rate": 10.0 / 0.575, "effort": 3e4}
+
+
+def observed(fmu: Path, interface: str) -> Outcome:
+    """An observer FMU that takes balises, on a shipped train."""
+    s = Scenario(stop=10.0, step=0.1).add("train", model="locomotive", parameters=MOVING)
+    s = s.add("observer", fmu=str(fmu), interface=interface, tolerance=1e-10)  # type: ignore[typeddict-item]
+    s = s.connect("train.wheel_speed -> observer.odometer")
+    s = s.balises(position="train.position", speed="train.speed", layout="positions", positions=[30.0, 80.0])
+    return s.run()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_an_observer_takes_telegrams_in_model_exchange_as_in_co_simulation(
+    tmp_path: Path, version: Literal[2, 3]
+) -> None:
+    """By the clock in FMI 3, by the count in FMI 2."""
+    system = OBSERVERS["takagi_sugeno_cdo"]()
+    fmu = fmus.build_fmu(system, tmp_path / "observer.fmu", fmi_version=version, preset="long_gaps")
+    one, other = (observed(fmu, interface) for interface in ("co-simulation", "model-exchange"))
+    for outcome in (one, other):
+        assert outcome.failure is None
+        assert [event.outcomes["observer"] for event in outcome.result.events] == ["accepted", "accepted"]
+    for signal in ("observer.position", "observer.speed"):
+        assert np.abs(one[signal] - other[signal]).max() < 1e-7
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_train_moves_as_under_the_solver_of_fmpy(tmp_path: Path, version: Literal[2, 3]) -> None:
+    fmu = fmus.build_fmu(Locomotive(), tmp_path / "train.fmu", fmi_version=version)
+    s = Scenario(stop=20.0, step=0.1)
+    s = s.add("train", fmu=str(fmu), interface="model-exchange", tolerance=1e-9, parameters=MOVING | {"effort": -4e4})
+    ours = s.run()
+    theirs = fmpy.simulate_fmu(
+        str(fmu),
+        fmi_type="ModelExchange",
+        solver="CVode",
+        relative_tolerance=1e-9,
+        stop_time=20.0,
+        output_interval=0.1,
+        start_values=MOVING | {"effort": -4e4},
+        output=["position", "speed"],
+    )
+    at = np.searchsorted(theirs["time"], ours["time"] - 1e-9)
+    for signal in ("position", "speed"):
+        assert np.abs(ours[f"train.{signal}"] - theirs[signal][at]).max() < 1e-5
+
+
+@pytest.mark.parametrize("model", ["TRAIN", "DECAY", "STEPS"])
+@pytest.mark.parametrize("version", [1, 2, 3])
+def test_both_steppers_give_equal_bits(tmp_path: Path, model: str, version: int) -> None:
+    fmu = exchange_fmu(tmp_path, model, version)
+    outcomes = []
+    for stepper in ("python", "compiled"):
+        s = Scenario(stop=2.0, step=0.1).add("plant", fmu=str(fmu), parameters={"input": 0.3})
+        s = s.add("other", fmu=str(fmu)).connect("plant.position -> other.input")
+        outcomes.append(s.set("master.stepper", stepper).set("master.events", "local").run())
+    assert outcomes[0].result.table.tobytes() == outcomes[1].result.table.tobytes()
+
+
+def test_keys_of_a_solver_belong_to_an_fmu() -> None:
+    with pytest.raises(CosimError, match="'method' belongs to an FMU, which a solver moves in model exchange"):
+        Scenario(stop=1.0, step=0.1).add("train", model="locomotive", method="adams")
+    with pytest.raises(CosimError, match="method"):
+        Scenario(stop=1.0, step=0.1).add("train", fmu="x.fmu", method="euler")  # type: ignore[typeddict-item]
