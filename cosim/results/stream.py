@@ -171,7 +171,7 @@ class _StreamFile(RowFile):
     """The table of a stream: a NumPy file with its number of rows kept true."""
 
     def __init__(self, path: Path, dtype: np.dtype[np.void], rows: int, stream: Stream) -> None:
-        self._dtype, self._stream, self._path = dtype, stream, path
+        self._dtype, self._stream = dtype, stream
         self._synced = monotonic()
         self._broken: OSError | None = None
         super().__init__(None, dtype.itemsize, rows, path, len(growing_header(dtype, 0)))
@@ -200,7 +200,7 @@ class _StreamFile(RowFile):
         """All rows as a structured array that is a map of the file and cannot be changed, shape (count,)."""
         if not self.count:
             return np.empty(0, dtype)
-        return np.memmap(self._path, dtype=dtype, mode="r", offset=self._offset, shape=(self.count,))
+        return np.memmap(self._file, dtype=dtype, mode="r", offset=self._offset, shape=(self.count,))
 
     def finish(self) -> None:
         """Cut off what is reserved."""

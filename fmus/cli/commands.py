@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import argparse
 import ast
+import io
 import shlex
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -208,6 +210,9 @@ class CommandProgram:
         Returns:
             The exit code: that of the command, 2 for an error or an interruption, 141 where nobody reads any more.
         """
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):  # a terminal may know ASCII alone
+                stream.reconfigure(errors="replace")
         if not words or words[0] == _COMPLETION:
             print(self.completion(" ".join(words[1:]) or "bash") if words else self.first_screen())
             return _DONE

@@ -5,12 +5,14 @@ than the terminal; and what the help says of them.
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import logging
 import os
 import re
 import shlex
 import shutil
+import sys
 import warnings
 import zipfile
 from collections.abc import Iterator
@@ -225,6 +227,23 @@ def test_every_command_prints_warnings_a_line_each_and_whole_where_asked(
     assert end == "(--verbose shows warnings whole)"
     assert program.run([*words, "--verbose"]) == 0
     assert "It stands at 0.5 s. It says nothing." in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("program", LINES)
+def test_a_terminal_that_knows_ascii_alone_shows_the_rest(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = io.TextIOWrapper(io.BytesIO(), "ascii")
+    monkeypatch.setattr(sys, "stdout", shown)
+    monkeypatch.setattr(
+        argparse.ArgumentParser, "set_defaults", lambda parser, **_: parser._defaults.update(execute=dash)
+    )
+    assert PROGRAMS[program].run(["list"]) == 0
+    shown.seek(0)
+    assert shown.read() == "From 1 ? 2.\n"
+
+
+def dash(_options: argparse.Namespace) -> Output:
+    """What a command with a character beyond ASCII returns."""
+    return Output(verdict="From 1 – 2.")
 
 
 @pytest.mark.parametrize("program", LINES)

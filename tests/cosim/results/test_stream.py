@@ -7,6 +7,7 @@ from __future__ import annotations
 import io
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -274,6 +275,26 @@ def test_a_full_disk_ends_the_run_and_the_folder_has_what_came_before(
     whole = quietly(small().set("step", 0.001)).result.table
     assert 200 < len(outcome.result.table) < 400  # 19 signals and the time, 160 bytes a row
     np.testing.assert_array_equal(read_results(tmp_path).table, whole[: len(outcome.result.table)])
+
+
+@pytest.mark.parametrize("kind", ["stream", "fallback"])
+def test_a_folder_that_is_removed_on_the_way_costs_no_row(tmp_path: Path, kind: str) -> None:
+    """Where a telegram comes that it should take the run ends, in words; its rows are there."""
+    expected = quietly(small())
+    removed: list[float] = []
+
+    def remove(now: float, _end: float) -> None:
+        removed.append(now)
+        shutil.rmtree(tmp_path / "run", ignore_errors=True)
+
+    outcome = quietly(small(), progress=remove, **{kind: tmp_path / "run"})
+    assert removed
+    assert "No such file or directory" in str(outcome.failure)
+    rows = outcome.result.table
+    assert len(rows) > 20
+    assert np.array_equal(rows, expected.result.table[: len(rows)])
+    outcome.write(tmp_path / "run", report=False)
+    assert len(load_result(tmp_path / "run").table) == len(rows)
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path: Path) -> None:
