@@ -22,6 +22,7 @@ from cosim.fmu_filter.journal import EQUAL_WITHIN, FilterJournal
 from cosim.fmu_filter.many import EnsembleFilter, FmuParticleFilter
 from cosim.fmu_filter.scale import Scale, scale_of, shown
 from cosim.fmu_filter.settings import FilterTable
+from cosim.fmu_filter.shadow import Shadow
 from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_saving, check_states, usual_step
@@ -93,6 +94,7 @@ class FmuFilterModel:
         self._means = [self._words[name] for name in self._estimated]
         self._deviations = [f"{name}_std" for name in self._means]
         self._unchecked = not checked and table.kind != "particle"
+        self._shadow = self._shadow_beside(numbers) if self._unchecked else None
         self._journal: FilterJournal | None = None
         self._next = self._missed = 0
         self._u = model.start_inputs.copy()
@@ -118,6 +120,8 @@ class FmuFilterModel:
             inputs = {name: self._scales[name].own(x) if name in self._scales else x for name, x in inputs.items()}
         self._u = np.array([inputs[name] for name in self._driven], dtype=float)
         journal.predict(dt, self._u)
+        if self._shadow is not None:
+            self._shadow.follow(t, dt, self._u)
         now = t + dt
         period = table.sample_period
         if self._seen and (period is None or now >= self._origin + self._next * period - EQUAL_WITHIN):
@@ -151,7 +155,8 @@ class FmuFilterModel:
     def get_state(self) -> Any:
         """What to keep in order to return here."""
         journal = None if self._journal is None else self._journal.state()
-        return journal, self._next, self._u.copy(), getattr(self, "_origin", 0.0), self._missed
+        shadow = None if self._shadow is None else self._shadow.state()
+        return journal, self._next, self._u.copy(), getattr(self, "_origin", 0.0), self._missed, shadow
 
     def set_state(self, state: Any) -> None:
         """Return.
@@ -159,7 +164,9 @@ class FmuFilterModel:
         Args:
             state: from `get_state`.
         """
-        journal, self._next, self._u, self._origin, self._missed = state
+        journal, self._next, self._u, self._origin, self._missed, shadow = state
+        if self._shadow is not None and not self._shadow.restore(shadow):
+            self._shadow = None
         if journal is None:
             self._journal = None
         else:
@@ -169,6 +176,14 @@ class FmuFilterModel:
         return FmuFilterModel(*self._made_of, checked=True)
 
     # -- internals ----------------------------------------------------------------------------------------------------
+
+    def _shadow_beside(self, parameters: Mapping[str, float]) -> Shadow | None:
+        """An undisturbed run beside it, where the FMU is started again at each step and may have a second instance."""
+        path, table, _, units = self._made_of
+        alone = self._model.instance.capabilities.canBeInstantiatedOnlyOncePerProcess
+        if self._model.way == "exchange" or alone:
+            return None
+        return Shadow(_opened(path, table, parameters, units), self._model)
 
     def _begun(self, t: float) -> FilterJournal:
         if self._journal is None:

@@ -184,11 +184,31 @@ def _deviation(
     model: SealedModel, rows: list[tuple[Array, Array]], k: int, again: tuple[Array, Array], t: float
 ) -> tuple[float, bool]:
     """Largest deviation from row k of the run as a share of its change, and whether there is none at all."""
-    names = (*model.states, *model.outputs)
     run, redone = np.concatenate(rows[k]), np.concatenate(again)
     change = np.max(
         [np.abs(np.concatenate(rows[i]) - np.concatenate(rows[i - 1])) for i in range(1, len(rows))], axis=0
     )
+    apart = demand_continued(model, run, redone, change, t)
+    shares = apart / np.maximum(change, np.finfo(float).tiny)
+    return float(np.max(np.where(apart <= ROUNDING * np.maximum(np.abs(run), 1.0), 0.0, shares))), bool(
+        (run == redone).all()
+    )
+
+
+def demand_continued(model: SealedModel, run: Array, redone: Array, change: Array, t: float) -> Array:
+    """Refuse an FMU that goes on otherwise from its states than in a run.
+
+    Args:
+        model: the FMU. run: its states and outputs after a step of a run, shape (n + q,).
+        redone: the same after that step from a restart. change: largest change of each over a step. t: instant [s].
+
+    Returns:
+        How far both are apart, shape (n + q,).
+
+    Raises:
+        FmuModelError: a value is no finite number, or they are further apart than a solver makes them.
+    """
+    names = (*model.states, *model.outputs)
     broken = np.flatnonzero(~(np.isfinite(run) & np.isfinite(redone)))
     if len(broken):
         raise FmuModelError(f"{model.path}: {names[broken[0]]} is no finite number at t = {t:g} s.")
@@ -201,10 +221,7 @@ def _deviation(
             f"{float(redone[i])!r} at t = {t:g} s, and {float(run[i])!r} in the run: the FMU holds more than these "
             "states (samples, delays, modes). Name the missing states, or use a particle filter over saved states."
         )
-    shares = apart / np.maximum(change, np.finfo(float).tiny)
-    return float(np.max(np.where(apart <= ROUNDING * np.maximum(np.abs(run), 1.0), 0.0, shares))), bool(
-        (run == redone).all()
-    )
+    return np.asarray(apart)
 
 
 def _idle(model: SealedModel, t: float, x: Array, u: Array, h: float) -> tuple[str, ...]:

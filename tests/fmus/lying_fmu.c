@@ -29,6 +29,7 @@ typedef struct {
     double hidden[2];    /* forces on their way: each acts a step later */
     double time;
     double pulses; /* counted events that have happened: each adds one to the speed */
+    double latched; /* LIE_LATCHES: a force of more than 5 was there, and all forces act by half from then on */
 } Data;
 
 typedef struct {
@@ -76,6 +77,10 @@ static void flow(Instance *instance, double h) {
 #endif
 #ifdef LIE_LOGGING_CHANGES
     force += instance->logging ? 1e-6 : 0.0;
+#endif
+#ifdef LIE_LATCHES
+    d->latched = d->latched || force > 5.0;
+    force *= d->latched ? 0.5 : 1.0;
 #endif
     const double decay = exp(-0.5 * h), limit = 2.0 * force, v = d->value[SPEED];
     d->value[POSITION] += limit * h + (v - limit) * (1.0 - decay) * 2.0;
