@@ -66,19 +66,6 @@ class StepResponse:
 
 
 @dataclass(frozen=True)
-class SeenUnit:
-    """A unit that a response shows.
-
-    Args:
-        unit: its name. sign: -1 where it counts the other way. reason: why.
-    """
-
-    unit: str
-    sign: int
-    reason: str
-
-
-@dataclass(frozen=True)
 class Motion:
     """Speed and position of the train.
 

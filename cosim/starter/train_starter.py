@@ -202,8 +202,8 @@ def _to_odometer(roles: PlantRoles, radius: float | None) -> GuessedLink:
         assert signal.meaning is not None
         seen = f"{radius:g} m by a probe run" if radius else f"{RADIUS} m: WRITE YOURS"
         remark += f"; times the wheel radius, {seen}"
-        factor = (radius or RADIUS) * signal.meaning.factor
-        return GuessedLink(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, factor)
+        rim = (radius or RADIUS) * signal.meaning.factor
+        return GuessedLink(f"{PLANT}.{signal.name}", ["odometer.wheel_speed"], remark, rim)
     if signal.unit is None:
         remark += "; it declares no unit: m/s is assumed"
     factor = _factor(found)
