@@ -13,9 +13,6 @@ from cosim.results.result_data import SignalInfo
 from cosim.results.si import CHUNK
 from plant_models.hybrid.units import Unit, UnitError, parse_unit
 
-_STEPS = (0, 1, -1, 2, -2)
-"""Neighbours of a quotient, in steps of its last bit, among which is the number that was converted."""
-
 
 def own_units(table: np.ndarray, signals: Sequence[SignalInfo]) -> dict[str, Unit]:
     """Units of the columns that can be shown in another unit than SI without a loss, by name.
@@ -29,16 +26,14 @@ def own_units(table: np.ndarray, signals: Sequence[SignalInfo]) -> dict[str, Uni
 
 
 def own_numbers(values: np.ndarray, unit: Unit) -> np.ndarray | None:
-    """Numbers in a unit that are these values in SI bit by bit; None where there are none.
+    """Numbers in a unit that are these values in SI bit by bit; None where a value is no such number, which those of an
+    FMU always are.
 
     Args:
         values: in SI, shape (rows,). unit: wanted.
     """
-    found = near = (np.asarray(values, dtype=float) - unit.offset) / unit.factor
+    found = np.asarray((values - unit.offset) / unit.factor)
     with np.errstate(invalid="ignore"):
-        for step in _STEPS:
-            wrong = (unit.factor * found + unit.offset != values) & ~np.isnan(values)
-            found = np.where(wrong, near + step * np.spacing(near), found)
         wrong = (unit.factor * found + unit.offset != values) & ~np.isnan(values)
     return None if wrong.any() else found
 
