@@ -16,6 +16,7 @@ from typing import Any
 import fmpy
 import numpy as np
 
+from fmus.exchange.native_steps import CExchange, address
 from fmus.fmi.standard import ERROR, Method
 
 Rates = Callable[[float, Any, Any], int]
@@ -25,6 +26,8 @@ up.
 
 _RATES = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 _WEIGHTS = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+Native = tuple[CExchange, Any]
+"""A model as C calls it, and the library whose functions do."""
 _LIBRARIES = (
     "sundials_core",
     "sundials_nvecserial",
@@ -97,7 +100,7 @@ class Cvode:
         count: number of states, at least one. root_count: number of root functions.
         rates, roots: see `Rates`.
         tolerance: relative. nominals: magnitudes of the states, shape (n,), by which absolute tolerances follow.
-        method: multistep formula.
+        method: multistep formula. native: functions in C for `rates` and `roots`; None where there are none.
     """
 
     def __init__(
@@ -109,6 +112,7 @@ class Cvode:
         tolerance: float,
         nominals: np.ndarray,
         method: Method = "bdf",
+        native: Native | None = None,
     ) -> None:
         self._library = _libraries()
         self._count, self._root_count, self._method = count, root_count, _NUMBERS[method]
@@ -123,6 +127,9 @@ class Cvode:
         self.absolute = tolerance * nominals
         self._weights, self._views = _WEIGHTS(self._weigh), dict[int, np.ndarray]()
         self._rates, self._roots = _RATES(self._with_arrays(rates)), _RATES(self._with_roots(roots, root_count))
+        self.native: CExchange | None = None
+        if native is not None:
+            self._take(*native)
         self._reached, self._order, self._share = ctypes.c_double(), ctypes.c_int(), 1.0
         self.steps = 0
 
@@ -136,6 +143,8 @@ class Cvode:
             self._begin(t)
         self._call("CVodeReInit", ctypes.c_double(t), self._x)
         self._share = max(_START, min(1.0, _FINEST / self.tolerance))
+        if self.native is not None:
+            self.native.share = self._share
 
     def step(self, stop: float) -> tuple[float, bool]:
         """One internal step, which ends at `stop` [s] at the latest.
@@ -153,11 +162,27 @@ class Cvode:
             self._pointer(), ctypes.c_double(stop), self._x, ctypes.byref(reached), ctypes.c_int(_ONE_STEP)
         )
         if flag < 0:
-            self._fail(flag)
+            self.fail(flag)
         if self._share < 1.0:
             self._call("CVodeGetLastOrder", ctypes.byref(self._order))
-            self._share = 1.0 if self._order.value >= _STARTED else self._share
+            if self._order.value >= _STARTED:
+                self._share = 1.0
+                if self.native is not None:
+                    self.native.share = 1.0
         return (stop if flag == _AT_STOP else float(reached.value)), flag == _AT_ROOT
+
+    def fail(self, flag: int) -> None:
+        """Raise what CVODE says.
+
+        Args:
+            flag: below zero.
+
+        Raises:
+            SolverError: always.
+        """
+        if flag not in list(_Cause):
+            raise SolverError(f"CVODE returned {flag}")
+        raise SolverError(WORDS[_Cause(flag)], None if flag in _UNASKED else self._worst(_Cause(flag)))
 
     def between(self, t: float) -> np.ndarray:
         """States at an instant within the last step [s], by the polynomial of the solver, shape (n,); valid until the
@@ -184,7 +209,19 @@ class Cvode:
         self._made += [("SUNMatDestroy", matrix), ("SUNLinSolFree", solver)]
         self._call("CVodeSetLinearSolver", solver, matrix)
         self._call("CVodeSetNoInactiveRootWarn")
+        if self.native is not None:
+            self.native.memory = self._memory
+            self._call("CVodeSetUserData", ctypes.byref(self.native))
         self._call("CVodeSetMaxHnilWarns", ctypes.c_int(-1))  # a step that is too small fails in the end, and says so
+
+    def _take(self, model: CExchange, functions: Any) -> None:
+        """Have C in the place of the functions in Python."""
+        library, model.x, model.tolerance = self._library, self._x.value, self.tolerance
+        model.absolute = self.absolute.ctypes.data
+        model.array, model.set_stop = address(library.N_VGetArrayPointer), address(library.CVodeSetStopTime)
+        model.step, model.last_order = address(library.CVode), address(library.CVodeGetLastOrder)
+        self._rates, self._roots = _RATES(address(functions.exchange_rates)), _RATES(address(functions.exchange_roots))
+        self._weights, self.native = _WEIGHTS(address(functions.exchange_weights)), model
 
     def _vector(self) -> tuple[ctypes.c_void_p, np.ndarray]:
         """A vector of the solver, and its numbers."""
@@ -240,11 +277,6 @@ class Cvode:
         if flag < 0:
             raise SolverError(f"{name} returned {flag}")
 
-    def _fail(self, flag: int) -> None:
-        if flag not in list(_Cause):
-            raise SolverError(f"CVODE returned {flag}")
-        raise SolverError(WORDS[_Cause(flag)], None if flag in _UNASKED else self._worst(_Cause(flag)))
-
     def _worst(self, cause: _Cause) -> int:
         """Number of the state whose error, or whose change where no step was tried, is the largest share of its
         tolerance.
@@ -254,7 +286,7 @@ class Cvode:
         if cause is _Cause.ERROR_TEST:
             self._call("CVodeGetEstLocalErrors", errors)
         else:
-            self._rates(self._reached, self._x, errors, None)
+            self._rates(self._reached, self._x, errors, None if self.native is None else ctypes.addressof(self.native))
         return int(np.argmax(np.nan_to_num(np.abs(e * w), nan=np.inf)))
 
     def __del__(self) -> None:

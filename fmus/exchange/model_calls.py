@@ -11,6 +11,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException, fmi1EventInfo
 from fmpy.fmi2 import fmi2EventInfo
 
+from fmus.exchange.native_steps import CExchange, describe_model, load_steps
 from fmus.fmi.native_calls import WARNING
 from fmus.fmi.standard import DISCARD, NEVER
 
@@ -65,6 +66,7 @@ class ModelCalls:
         self._slave, self._version, self._functions = slave, version, functions
         self.state_count, self.indicator_count = counts
         self._complete_steps = complete_steps
+        self._names: list[str] = []
         self.failed: FMICallException | None = None  # with which the FMU last refused what a solver asked
         self._set_time, self._set_states = self._made("SetTime"), self._made("SetContinuousStates")
         self._get_rates, self._get_indicators = self._made(self._name("rates")), self._made("GetEventIndicators")
@@ -154,6 +156,39 @@ class ModelCalls:
         enter, end = kind(), kind()
         self.call("CompletedIntegratorStep", kind(0), ctypes.byref(enter), ctypes.byref(end))
         return bool(enter.value), bool(end.value)
+
+    def native(self) -> tuple[CExchange, Any] | None:
+        """The FMU as C calls it, and what calls it; None where there is no compiler, or its calls are logged."""
+        library = None if self._slave.fmiCallLogger is not None else load_steps()
+        if library is None:
+            return None
+        names = ["SetTime", "SetContinuousStates", self._name("rates"), "GetEventIndicators", "CompletedIntegratorStep"]
+        functions = [self._functions[f"fmi{self._version}{name}"] for name in names]
+        if not self._complete_steps:
+            functions[-1] = None
+        counts = self.state_count, self.indicator_count
+        self._names = names
+        return describe_model(self._slave.component, functions, self._version, counts), library
+
+    def after_native(self, model: CExchange, *, refused: bool) -> None:
+        """Take over what C met: warnings are counted, and a refusal is kept, or raised outside of the solver.
+
+        Args:
+            model: as C left it. refused: whether the FMU refused outside of the solver.
+
+        Raises:
+            FMICallException: it did.
+        """
+        for place, name in enumerate(self._names):
+            for _ in range(model.warnings[place]):
+                self._slave.warned(f"fmi{self._version}{name}")
+            model.warnings[place] = 0
+        if model.status:
+            error = FMICallException(f"fmi{self._version}{self._names[model.place]}", int(model.status))
+            model.status = 0
+            if refused:
+                raise error
+            self.failed = error
 
     def call(self, name: str, *arguments: Any) -> None:
         """Call a function with the instance and arguments.

@@ -7,6 +7,7 @@ anew after an event, and after a state was saved or restored, so that what follo
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from fmus.exchange.cvode import Cvode, SolverError
 from fmus.exchange.model_calls import EventIteration, ModelCalls
+from fmus.exchange.native_steps import EVENT, GAVE_UP, REFUSED, TERMINATE, TOO_MANY, CExchange, load_steps
 from fmus.fmi.standard import ERROR, MAX_EVENT_ITERATIONS, MAX_RETURNS_PER_STEP, NEVER, TIME_TOLERANCE, Method
 
 MOST_AT_ONCE = 100
@@ -51,7 +53,14 @@ class Motion:
         self._model, self._state_name = model, state_name
         nominals = np.ones(max(model.state_count, 1))
         self.solver = Cvode(
-            len(nominals), model.indicator_count, model.rates, model.indicators, tolerance, nominals, method
+            len(nominals),
+            model.indicator_count,
+            model.rates,
+            model.indicators,
+            tolerance,
+            nominals,
+            method,
+            model.native(),
         )
         self._x = self.solver.address(self.solver.states)
         self.in_event_mode, self.terminated, self.next_event = True, False, NEVER
@@ -136,7 +145,7 @@ class Motion:
         for _ in range(MOST_STEPS):
             event, stop = False, min(until, self.next_event)
             if stop - t > _ROUNDING * max(abs(t), abs(stop)) * 2.0:
-                t, event, terminate = self._internal_step(t, stop)
+                t, event, terminate = self._internal_steps(t, stop)
                 if terminate:
                     return _StepEnd(t, event, terminate)
             elif stop > t:
@@ -147,20 +156,23 @@ class Motion:
                 return _StepEnd(t, event=True, terminate=False)
             if t >= until - _ROUNDING * max(abs(until), 1.0):
                 return _StepEnd(until, event=False, terminate=False)
-        raise SolverError(f"at t = {t:.12g} s: the solver takes more than {MOST_STEPS} steps in one communication step")
+        raise _too_many(t)
 
     def look(self, t: float) -> None:
         """Put the FMU at an instant within the last internal step [s], in states from the solver's polynomial."""
         self._model.move(t, self.solver.address(self.solver.between(t)))
 
-    def _internal_step(self, t: float, stop: float) -> _StepEnd:
-        model, solver = self._model, self.solver
+    def _internal_steps(self, t: float, stop: float) -> _StepEnd:
+        """One step of the solver, or in C all to the first event."""
+        model, solver, native = self._model, self.solver, self.solver.native
+        if self._anew:
+            model.states(self._x)
+            solver.absolute[:] = solver.tolerance * model.nominals()
+            solver.restart(t)
+            self._anew = False
+        if native is not None and self.follower is None:
+            return self._native_steps(native, t, stop)
         try:
-            if self._anew:
-                model.states(self._x)
-                solver.absolute[:] = solver.tolerance * model.nominals()
-                solver.restart(t)
-                self._anew = False
             reached, root = solver.step(stop)
         except SolverError as error:
             raise self._explained(error, t) from error
@@ -171,8 +183,27 @@ class Motion:
         wanted, terminate = model.completed()
         return _StepEnd(reached, root or wanted, terminate)
 
+    def _native_steps(self, native: CExchange, t: float, stop: float) -> _StepEnd:
+        """Steps in C; raises what the same steps in Python raise."""
+        library = load_steps()
+        assert library is not None
+        native.reached = t
+        ended = library.exchange_steps(ctypes.addressof(native), stop, MOST_STEPS)
+        self.solver.steps, native.steps = self.solver.steps + native.steps, 0
+        if ended == GAVE_UP:
+            try:
+                self.solver.fail(int(native.flag))
+            except SolverError as error:
+                raise self._explained(error, native.reached) from error
+        self._model.after_native(native, refused=ended == REFUSED)
+        if ended == TOO_MANY:
+            raise _too_many(native.reached)
+        return _StepEnd(float(native.reached), ended == EVENT, ended == TERMINATE)
+
     def _explained(self, error: SolverError, t: float) -> SolverError:
         """The solver's words with time and state, or those of the FMU where it refused what the solver asked."""
+        if self.solver.native is not None:
+            self._model.after_native(self.solver.native, refused=False)
         refused, self._model.failed = self._model.failed, None
         known = error.worst is not None and self._model.state_count
         worst = f"; it is worst for {self._state_name(error.worst or 0)}" if known else ""
@@ -189,3 +220,7 @@ class Motion:
                 f"events do not settle at t = {t:.12g} s: {self._at_once} of them, each within {TIME_TOLERANCE:g} s of "
                 "the one before it (a model that chatters, or a ball that bounces faster and faster)"
             )
+
+
+def _too_many(t: float) -> SolverError:
+    return SolverError(f"at t = {t:.12g} s: the solver takes more than {MOST_STEPS} steps in one communication step")

@@ -15,6 +15,7 @@ from test_fmus.exchange import exchange_fmu
 from cosim.components.component import Component
 from cosim.components.loading import load_fmu
 from cosim.errors import FmuLoadError, RunError
+from fmus.exchange.model_calls import ModelCalls
 
 VERSIONS = (1, 2, 3)
 FINE = 1e-10
@@ -199,6 +200,27 @@ def test_the_tolerance_is_that_of_the_solver(folder: Path, method: str) -> None:
         fmu.free()
     assert errors[0] > errors[1] > errors[2]
     assert errors[2] < 1e-9
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("model", ["DECAY", "BALL", "STAIR", "STEPS", "TRAIN", "ESCAPES", "REFUSES"])
+def test_steps_of_the_solver_in_c_give_the_bits_and_words_of_those_in_python(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, model: str, version: int
+) -> None:
+    seen = []
+    for native in (True, False):
+        if not native:
+            monkeypatch.setattr(ModelCalls, "native", lambda _self: None)
+        fmu, rows = Stepped(exchange_fmu(folder, model, version), 1e-7), list[object]()
+        assert (fmu.component.slave.solved.motion.solver.native is not None) == native
+        try:
+            rows.extend(fmu.to(0.1 * k, 0.1 * (k // 3)).tobytes() for k in range(1, 23))
+        except RunError as error:
+            rows.append(str(error))
+        rows.append(fmu.component.slave.solved.motion.solver.steps)
+        seen.append(rows)
+        fmu.free()
+    assert seen[0] == seen[1]
 
 
 def test_an_interface_that_an_fmu_does_not_offer_is_refused(folder: Path) -> None:

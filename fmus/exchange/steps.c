@@ -1,0 +1,136 @@
+/* Internal steps of CVODE over a model exchange FMU: what `cvode.py` and `motion.py` do in Python, without Python between. */
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
+enum { SET_TIME, SET_STATES, GET_RATES, GET_INDICATORS, COMPLETED, FUNCTIONS };
+enum { WARNING = 1, DISCARD = 2 };
+enum { ONE_STEP = 2, AT_STOP = 1, AT_ROOT = 2, STARTED = 3 };
+enum { REACHED, EVENT, TERMINATE, GAVE_UP, REFUSED, TOO_MANY };
+
+typedef struct {
+    void *functions[FUNCTIONS]; /* of the FMU; the last one NULL where it need not be told of completed steps */
+    void *instance;
+    int64_t version, states, indicators;
+    double *(*array)(void *vector);
+    int (*set_stop)(void *memory, double stop);
+    int (*step)(void *memory, double stop, void *x, double *reached, int task);
+    int (*last_order)(void *memory, int *order);
+    void *memory, *x;
+    const double *absolute;
+    double tolerance, share, reached; /* `reached`: where it stands [s] */
+    int64_t steps, flag, status, place; /* what CVODE said last; what the FMU refused with, and which function did */
+    int64_t warnings[FUNCTIONS];
+} Exchange;
+
+typedef int (*SetTime)(void *, double);
+typedef int (*Transfer)(void *, double *, size_t);
+typedef int (*Completed1)(void *, char *);
+typedef int (*Completed2)(void *, int, int *, int *);
+typedef int (*Completed3)(void *, bool, bool *, bool *);
+
+/* Whether the FMU did what it was asked for. */
+static bool done(Exchange *e, int64_t place, int status) {
+    e->warnings[place] += status == WARNING;
+    if (status <= WARNING)
+        return true;
+    e->status = status;
+    e->place = place;
+    return false;
+}
+
+static bool transfer(Exchange *e, int64_t place, double *values, int64_t count) {
+    return done(e, place, ((Transfer)e->functions[place])(e->instance, values, (size_t)count));
+}
+
+static bool move(Exchange *e, double t, double *x) {
+    return done(e, SET_TIME, ((SetTime)e->functions[SET_TIME])(e->instance, t)) && (e->states == 0 || transfer(e, SET_STATES, x, e->states));
+}
+
+static int said(const Exchange *e, bool done) {
+    return done ? 0 : e->status == DISCARD ? 1 : -1;
+}
+
+EXPORT int exchange_rates(double t, void *x, void *written, void *data) {
+    Exchange *e = data;
+    if (e->states == 0) { /* a state that stands, so that the solver has one */
+        e->array(written)[0] = 0.0;
+        return 0;
+    }
+    return said(e, move(e, t, e->array(x)) && transfer(e, GET_RATES, e->array(written), e->states));
+}
+
+EXPORT int exchange_roots(double t, void *x, double *written, void *data) {
+    Exchange *e = data;
+    return said(e, move(e, t, e->array(x)) && transfer(e, GET_INDICATORS, written, e->indicators));
+}
+
+EXPORT int exchange_weights(void *x, void *weights, void *data) {
+    Exchange *e = data;
+    double *states = e->array(x), *written = e->array(weights);
+    for (int64_t i = 0; i < (e->states ? e->states : 1); i++) {
+        double tolerated = e->share * (e->tolerance * fabs(states[i]) + e->absolute[i]);
+        if (!(tolerated > 0.0))
+            return -1;
+        written[i] = 1.0 / tolerated;
+    }
+    return 0;
+}
+
+static bool completed(Exchange *e, bool *event, bool *terminate) {
+    void *function = e->functions[COMPLETED];
+    *event = *terminate = false;
+    if (function == NULL)
+        return true;
+    if (e->version == 1) {
+        char wanted = 0;
+        bool fine = done(e, COMPLETED, ((Completed1)function)(e->instance, &wanted));
+        *event = wanted != 0;
+        return fine;
+    }
+    if (e->version == 2) {
+        int wanted = 0, end = 0;
+        bool fine = done(e, COMPLETED, ((Completed2)function)(e->instance, 0, &wanted, &end));
+        *event = wanted != 0;
+        *terminate = end != 0;
+        return fine;
+    }
+    return done(e, COMPLETED, ((Completed3)function)(e->instance, false, event, terminate));
+}
+
+/* Internal steps to `stop` [s], or to the first event before it. */
+EXPORT int64_t exchange_steps(Exchange *e, double stop, int64_t most) {
+    for (int64_t k = 0; k < most; k++) {
+        bool event, terminate;
+        int order = STARTED;
+        double reached = stop;
+        e->steps++;
+        e->flag = e->set_stop(e->memory, stop);
+        if (e->flag >= 0)
+            e->flag = e->step(e->memory, stop, e->x, &reached, ONE_STEP);
+        if (e->flag < 0)
+            return GAVE_UP;
+        if (e->share < 1.0) {
+            e->last_order(e->memory, &order);
+            if (order >= STARTED)
+                e->share = 1.0;
+        }
+        e->reached = e->flag == AT_STOP ? stop : reached;
+        if (!move(e, e->reached, e->array(e->x)) || !completed(e, &event, &terminate))
+            return REFUSED;
+        if (terminate)
+            return TERMINATE;
+        if (event || e->flag == AT_ROOT)
+            return EVENT;
+        if (e->flag == AT_STOP)
+            return REACHED;
+    }
+    return TOO_MANY;
+}
