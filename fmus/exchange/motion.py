@@ -116,11 +116,11 @@ class Motion:
 
     # -- time -------------------------------------------------------------------------------------------------------
 
-    def advance(self, t: float, until: float) -> _StepEnd:
-        """To the end of a communication step, events on the way handled.
+    def advance(self, t: float, until: float, *, returns: bool = False) -> _StepEnd:
+        """To the end of a communication step, events on the way handled; one at its end is left to the caller.
 
         Args:
-            t, until: begin and end [s].
+            t, until: begin and end [s]. returns: whether every event ends the step, and is left to the caller.
 
         Raises:
             FMICallException: the FMU refuses. SolverError: the solver cannot go on, or events do not settle.
@@ -130,13 +130,14 @@ class Motion:
                 self.settle()
                 if self.terminated:
                     return _StepEnd(t, event=False, terminate=True)
-            t, event, terminate = self.to_event(t, until)
-            if terminate or not event:
-                return _StepEnd(t, event=False, terminate=terminate)
+            end = self._to_event(t, until)
+            if end.terminate or not end.event or returns or until - end.time <= TIME_TOLERANCE:
+                return end
+            t = end.time
             self.enter_event_mode()
         raise SolverError(f"at t = {t:.12g} s: {MAX_RETURNS_PER_STEP} events in one communication step")
 
-    def to_event(self, t: float, until: float) -> _StepEnd:
+    def _to_event(self, t: float, until: float) -> _StepEnd:
         """To the first event, which is not handled, or the end of the step.
 
         Args:

@@ -24,7 +24,7 @@ from fmus.exchange.cvode import SolverError
 from fmus.exchange.model_calls import EventIteration, ModelCalls
 from fmus.exchange.motion import Motion, Part
 from fmus.fmi.elements import elements_of
-from fmus.fmi.standard import DISCARD, ERROR, NEVER, OK, WARNING, Method, fmi_version
+from fmus.fmi.standard import DISCARD, ERROR, NEVER, OK, TIME_TOLERANCE, WARNING, Method, fmi_version
 from fmus.fmi.types import BOOLEANS, CTYPES
 
 TOLERANCE = 1e-8
@@ -169,19 +169,20 @@ class CoSimulationFunctions:
         if self._version == 3:
             return self._step_to_event(t, t + h, *results)
         end = self._motion.advance(t, t + h)
+        if end.event:
+            self._motion.enter_event_mode()
+            self._motion.settle()
+            end = end._replace(terminate=self._motion.terminated)
         self.reached = end.time
         return DISCARD if end.terminate else OK
 
     def _step_to_event(self, t: float, until: float, event: int, terminate: int, early: int, reached: int) -> int:
-        motion = self._motion
-        if motion.in_event_mode:
-            motion.settle()
-        end = motion.to_event(t, until) if not motion.terminated else None
-        stands = t if end is None else end.time
-        ends = (event, end is not None and end.event), (terminate, end is None or end.terminate)
-        for address, said in (*ends, (early, stands < until)):
+        """To the first event, or in one that does not declare early returns to an event at the very end."""
+        end = self._motion.advance(t, until, returns=self._description.coSimulation.mightReturnEarlyFromDoStep)
+        returned = until - end.time > TIME_TOLERANCE
+        for address, said in ((event, end.event), (terminate, end.terminate), (early, returned)):
             ctypes.c_bool.from_address(address).value = said
-        ctypes.c_double.from_address(reached).value = self.reached = stands
+        ctypes.c_double.from_address(reached).value = self.reached = end.time
         return OK
 
     # -- inputs -----------------------------------------------------------------------------------------------------
