@@ -56,7 +56,7 @@ def find_facts(path: Path, assumed: Sequence[str], *, probing: bool) -> KnownFac
     try:
         found = _probed(path, inspected, facts)
     except CosimError as error:
-        remarks.append(f"A probe run failed ({error}); units and roles are guessed by names alone.")
+        remarks.append(f"A probe run failed; units and roles are guessed by names alone: {error}")
     facts = found.facts | {name: fact.over(found.facts.get(name)) for name, fact in facts.items()}
     if found.facts:
         remarks.append(f"A probe run of {path.name} showed, since it declares too little:")

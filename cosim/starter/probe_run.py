@@ -10,6 +10,7 @@ from time import monotonic
 import numpy as np
 
 from cosim.components.stated_units import StatedUnit
+from cosim.errors import RunError
 from cosim.run.outcome import Outcome
 from cosim.runs.executors import Executor
 from cosim.runs.run import Run
@@ -23,7 +24,7 @@ SIZES = (1.0, 30.0, 1e3, 3e4, 1e6)
 MORE = 1.5
 _MOVES = 0.05
 """Change of a speed from which on a train moves, in km/h or m/s."""
-CALL_TIMEOUT = 20.0  # [s]
+CALL_TIMEOUT = 10.0  # [s]
 LONGEST = 30.0  # [s]
 
 
@@ -49,10 +50,19 @@ class ProbeRun:
 
         Args:
             name: of the input. parameters: other start values. size: of the step; None for the smallest that moves it.
+
+        Raises:
+            RunError: the FMU fails at the first size already; a larger one may be more than it can take.
         """
-        for tried in (sign * s for s in SIZES for sign in (1.0, -1.0)) if size is None else (size,):
-            less, more = (self._run({**parameters, name: value}) for value in (tried, MORE * tried))
-            if less is None or more is None or monotonic() > self.deadline:
+        sizes = [sign * s for s in SIZES for sign in (1.0, -1.0)] if size is None else [size]
+        for tried in sizes:
+            try:
+                less, more = (self._run({**parameters, name: value}) for value in (tried, MORE * tried))
+            except RunError:
+                if tried == sizes[0] and size is None:
+                    raise
+                return None
+            if monotonic() > self.deadline:
                 return None
             less, more = _at_common_instants(less, more)
             columns = {n: more[n] - less[n] for n in less if n != "time"}
@@ -61,14 +71,17 @@ class ProbeRun:
                 return response
         return None
 
-    def _run(self, values: Mapping[str, float]) -> Mapping[str, np.ndarray] | None:
-        """The columns of a run by name, ``time`` among them; None where it failed."""
+    def _run(self, values: Mapping[str, float]) -> Mapping[str, np.ndarray]:
+        """The columns of a run by name, ``time`` among them."""
         steps = max(round(SPAN / self.step / 4.0), 1) * 4
         scenario = Scenario(stop=steps * self.step, step=self.step, master={"call_timeout": CALL_TIMEOUT})
         stated = {name: fact.model_dump(exclude_unset=True) for name, fact in self.units.items()}
         scenario.add(NAME, fmu=str(self.path), units=stated, parameters=dict(values), record=list(self.outputs))
         (_, ended), *_ = self.executor.each([Run(scenario, take=columns_of)])
-        return None if ended.failure is not None else ended.row
+        if ended.failure is not None:
+            raise RunError(ended.failure.reason)
+        columns: Mapping[str, np.ndarray] = ended.row
+        return columns
 
 
 def _at_common_instants(

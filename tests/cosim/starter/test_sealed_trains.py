@@ -5,7 +5,7 @@ new` writes is right without an answer.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,9 @@ import pytest
 
 import fmus
 from cosim import Scenario
+from cosim.runs.executors import InThisProcess
+from cosim.runs.job import Ended, Failure, Job
+from cosim.starter import known_facts
 from cosim.starter.starter_file import StarterWishes, write_starter
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 
@@ -99,6 +102,18 @@ def test_a_sealed_train_is_right_at_once(system: Any, tmp_path: Path) -> None:
     assert abs(outcome["observer.position"] - forward * outcome["plant.zz1"])[100:].max() < 0.5
     names: Mapping[str, str] = system.NAMES
     np.testing.assert_allclose(outcome[f"plant.{names['speed']}"], truth, atol=1e-9)
+
+
+class _Fails(InThisProcess):
+    def each(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Ended]]:
+        return ((job, Ended(failure=Failure("plant: doStep at t = 0.5 s ended the process"))) for job in jobs)
+
+
+def test_an_fmu_that_fails_in_the_probe_is_guessed_by_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(known_facts, "make_executor", lambda *_, **__: _Fails())
+    made = write_starter(fmus.cached_fmu(GERMAN, fmi_version=2), tmp_path / "mine.toml")
+    assert made.remarks[0].endswith("guessed by names alone: plant: doStep at t = 0.5 s ended the process")
+    assert "units" not in tomllib.loads(made.text)["components"]["plant"]
 
 
 def test_nothing_is_run_where_that_is_not_wanted(tmp_path: Path) -> None:
