@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from math import isfinite
 from pathlib import Path
 from typing import Any, get_args
 
@@ -50,6 +52,40 @@ def positive(text: str) -> int:
         raise argparse.ArgumentTypeError(no_number(text, whole=True)) from None
     if value < 1:
         raise argparse.ArgumentTypeError(f"must be at least 1 (got {value})")
+    return value
+
+
+def positive_number(text: str) -> float:
+    """A finite number above 0, for an option of a command.
+
+    Args:
+        text: as it was typed.
+
+    Raises:
+        argparse.ArgumentTypeError: it is something else.
+    """
+    return _finite(text, "above 0", lambda value: value > 0.0)
+
+
+def number_from_zero(text: str) -> float:
+    """A finite number of at least 0, for an option of a command.
+
+    Args:
+        text: as it was typed.
+
+    Raises:
+        argparse.ArgumentTypeError: it is something else.
+    """
+    return _finite(text, "of at least 0", lambda value: value >= 0.0)
+
+
+def _finite(text: str, which: str, holds: Callable[[float], bool]) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(no_number(text)) from None
+    if not (isfinite(value) and holds(value)):
+        raise argparse.ArgumentTypeError(f"expected a finite number {which} (got {text})")
     return value
 
 

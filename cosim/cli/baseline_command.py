@@ -17,7 +17,7 @@ from cosim.baselines.references import embed_baseline, find_references, read_ref
 from cosim.baselines.references.extract import extract_reference
 from cosim.baselines.subject import Subject, make_subject, run_again
 from cosim.baselines.update import plan_update
-from cosim.cli.arguments import FIGURE_FILES, OVERRIDES, QUIET, settings_argument
+from cosim.cli.arguments import FIGURE_FILES, OVERRIDES, QUIET, number_from_zero, positive_number, settings_argument
 from cosim.cli.scenarios import between_samples, parse_setting, simulated_time_bar
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
 from cosim.comparison.compare import curve_of
@@ -57,12 +57,17 @@ _MAKE = (
     ),
     argument("--start", type=float, metavar="SECONDS", help="begin of the run [s]"),
     argument("--stop", type=float, metavar="SECONDS", help="end of the run [s]"),
-    argument("--step", type=float, metavar="SECONDS", help="communication step of the run [s]"),
+    argument("--step", type=positive_number, metavar="SECONDS", help="communication step of the run [s]"),
     argument(
         "--record", nargs="+", default=[], metavar="NAME", help="of an FMU: variables to record besides the outputs"
     ),
     argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="signals to keep (default: all)"),
-    argument("--every", type=float, metavar="SECONDS", help="least spacing of the rows [s] (default: about 2000 rows)"),
+    argument(
+        "--every",
+        type=number_from_zero,
+        metavar="SECONDS",
+        help="least spacing of the rows [s] (default: about 2000 rows)",
+    ),
     FORCE,
     ALLOWED,
 )

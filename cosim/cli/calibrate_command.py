@@ -16,7 +16,7 @@ from cosim.calibration.fmu_runs import CALL_TIMEOUT, FmuRuns
 from cosim.calibration.recorded_signals import CalibrationError, Selection, sort_columns
 from cosim.calibration.running_resistance import RunningResistance
 from cosim.calibration.runs import Runs
-from cosim.cli.arguments import MANY_RUNS, PARAMETERS_FILE, settings_argument
+from cosim.cli.arguments import MANY_RUNS, PARAMETERS_FILE, positive_number, settings_argument
 from cosim.cli.output import save_figure, write_text
 from cosim.cli.scenarios import between_samples, parse_setting, setting_number
 from cosim.errors import CosimError, ScenarioError, nearest
@@ -94,7 +94,7 @@ ARGUMENTS = (
     argument("--to", type=float, default=inf, dest="end", metavar="SECONDS", help="end of the part to use"),
     argument(
         "--step",
-        type=float,
+        type=positive_number,
         metavar="SECONDS",
         help="longest communication step (default: the sampling); of an FMU that is driven its sampling (0.05)",
     ),
@@ -120,7 +120,7 @@ ARGUMENTS = (
     argument("--out", type=Path, metavar="DIR", help="folder of the journal of the runs, which --resume goes on with"),
     argument(
         "--call-timeout",
-        type=float,
+        type=positive_number,
         metavar="SECONDS",
         help=f"how long a call of an FMU may last ({CALL_TIMEOUT:g}; of a scenario master.call_timeout)",
     ),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.certify import Certified, Demands, certified, findings_table, scenario_observers, simulated
-from cosim.cli.arguments import settings_argument
+from cosim.cli.arguments import number_from_zero, positive_number, settings_argument
 from cosim.cli.model_info import declared_model, in_own_words
 from cosim.cli.scenarios import load_scenario, read_setting
 from cosim.errors import CosimError
@@ -53,11 +53,14 @@ ARGUMENTS = (
         "a parameter, for instance --set theta=5 or --set 'gain=[3.4, -3.4, -1.5]'; of a scenario any key"
     ),
     repeated("--option", "NAME=VALUE", "an option, for instance --option nodes=2"),
-    argument("--gap", type=float, metavar="S", help="certify any mixture of gaps up to this [s]"),
-    argument("--period", type=float, metavar="S", help="certify this constant gap [s]"),
-    argument("--delay", type=float, metavar="S", help="certify samples that arrive this late [s]"),
+    argument("--gap", type=positive_number, metavar="S", help="certify any mixture of gaps up to this [s]"),
+    argument("--period", type=positive_number, metavar="S", help="certify this constant gap [s]"),
+    argument("--delay", type=number_from_zero, metavar="S", help="certify samples that arrive this late [s]"),
     argument(
-        "--error", type=float, metavar="M_S", help="certify this largest speed error before the next sample [m/s]"
+        "--error",
+        type=positive_number,
+        metavar="M_S",
+        help="certify this largest speed error before the next sample [m/s]",
     ),
     argument("--missing", type=int, default=0, metavar="N", help="bound the error over up to N missing samples too"),
     argument("--by", choices=_KINDS, default="sufficient", help="kind of bound that decides (default: sufficient)"),

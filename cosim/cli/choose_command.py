@@ -14,7 +14,7 @@ from cosim.choice.choice import INTERRUPTED, Choice
 from cosim.choice.choose import FURTHER, SEEDS, choose, scenario_for_fmu
 from cosim.choice.replayed_run import replayed
 from cosim.choice.trial import Trial
-from cosim.cli.arguments import FIGURE_FILES, QUIET, settings_argument
+from cosim.cli.arguments import FIGURE_FILES, QUIET, positive, settings_argument
 from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import load_scenario
 from cosim.errors import OutputError, RunError, ScenarioError
@@ -91,7 +91,7 @@ ARGUMENTS = (
         help="one run again, of the one observer of --observers: the number of a seed, harder:NUMBER or nominal; "
         "--write then writes the scenario that plays it, in which cosim run shows the same error",
     ),
-    argument("--workers", type=int, default=1, metavar="N", help="processes at a time (default: 1)"),
+    argument("--workers", type=positive, default=1, metavar="N", help="processes at a time (default: 1)"),
     argument("--write", type=Path, metavar="FILE", help="write the scenario with the observer in it"),
     argument("--force", action="store_true", help="replace the file of --write where it exists"),
     argument("--out", metavar="DIR", help="also write page and data to this folder"),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import fmu_observer
 import plant_models
-from cosim.cli.arguments import settings_argument
+from cosim.cli.arguments import positive_number, settings_argument
 from cosim.cli.model_info import in_own_words
 from cosim.cli.scenarios import parse_setting, setting_number
 from cosim.components.loading import describe_fmu
@@ -65,7 +65,7 @@ ARGUMENTS = (
     ),
     argument(
         "--step",
-        type=float,
+        type=positive_number,
         default=0.01,
         metavar="SECONDS",
         help="communication step of a co-simulation (default: 0.01)",

@@ -142,9 +142,10 @@ class ResultData(FirstScreen, Mapping[str, np.ndarray]):
                 says how rows are chosen.
         """
         names = self.table.dtype.names or ()
-        if not isinstance(name, str):
+        key: Any = name
+        if not isinstance(key, str):
             example = names[1] if len(names) > 1 else "time"
-            raise KeyError(f"{name!r} is no name of a signal; a name is wanted, and rows behind it: [{example!r}][0]")
+            raise KeyError(f"{key!r} is no name of a signal; a name is wanted, and rows behind it: [{example!r}][0]")
         if name not in names:
             raise KeyError(f"signal {name!r} was not recorded; {nearest(name, names)}")
         return np.asarray(self.table[name])

@@ -97,8 +97,6 @@ def test_a_scenario_is_held_against_its_gaps(capsys: pytest.CaptureFixture[str])
 MISTAKES = [
     (["discrete_measurement_observr"], "did you mean 'discrete_measurement_observer'"),
     ([TRAIN, "--error", "1"], "has no bound of its error"),
-    ([TRAIN, "--gap", "-1"], "gap must be positive and finite [s], got -1.0"),
-    ([DMO, "--error", "-1"], "limit must be a positive number, got -1"),
     ([DMO, "--missing", "-1"], "must not be negative, got -1"),
     ([DMO, "--error", "1", "--set", "gain=[1,2,3]"], "must decay with bound_decay under gain"),
     ([DMO, "--set", "gain=x"], "needs 3 finite number(s), got 'x'"),

@@ -67,6 +67,26 @@ def test_an_option(program: str, words: list[str], flag: str, whole: bool, capsy
         assert typed in shown
 
 
+ABOVE_ZERO = ("--step", "--call-timeout", "--gap", "--period", "--error", "--workers", "--every", "--delay")
+"""Steps, spacings, limits and counts; the last two may be 0."""
+
+
+@pytest.mark.parametrize(
+    ("words", "flag"),
+    [(words, flag) for name, words, flag, _ in options() if name == "cosim" and flag in ABOVE_ZERO],
+    ids=str,
+)
+def test_an_option_that_cannot_be_negative(words: list[str], flag: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nor no number at all: said before anything is done, in one line."""
+    for typed in ("-1", "nan", "inf", *(["0"] if flag in ABOVE_ZERO[:-2] else [])):
+        with pytest.raises(SystemExit) as ended:
+            COSIM.run([*words, f"{flag}={typed}"])
+        shown = capsys.readouterr().err
+        assert (ended.value.code, shown.count("\n")) == (2, 1)
+        assert f"argument {flag}: " in shown
+        assert f"(got {typed})" in shown or f"(got '{typed}')" in shown
+
+
 def keys() -> Iterator[tuple[tuple[str, ...], str]]:
     """Each key of a scenario that is a number: the path of its table, and its name."""
     tables: dict[tuple[str, ...], type[BaseModel]] = {
