@@ -126,28 +126,23 @@ class Row:
 def ranked(rows: Sequence[Row]) -> list[Row]:
     """The rows in order, the best first.
 
-    Safe ones come before all others, in the order of their errors; but those that differ by less than `TIE` of the
-    allowance are as good: of those whose error is within it of the smallest the ones come first whose share of the
-    allowance is within it of the smallest, of these presets that were not made for another train, and of these
-    certified ones. Of unsafe ones those come first that leave the allowance in the smallest share of their runs, or in
-    one run more, which is chance: of these the smallest error is least bad.
+    Safe ones come before all others, or, where nothing is safe, those that leave the allowance in the smallest share of
+    their runs, or in one run more, which is chance. Of these the error decides; but those that differ by less than
+    `TIE` of the allowance are as good: of those whose error is within it of the smallest the ones come first whose
+    share of the allowance is within it of the smallest, of these presets that were not made for another train, and of
+    these certified ones. What is left comes in the order of how often it leaves the allowance.
 
     Args:
         rows: in any order.
     """
     tried = [row for row in rows if row.tried]
-    beyond = _least_beyond(tried)
-    error = min((row.rms for row in tried if row.safe), default=inf) + TIE * allowed(tried)
-    share = min((row.share for row in tried if row.safe and row.rms <= error), default=inf) + TIE
+    good = _good(tried)
+    error = min((row.rms for row in good), default=inf) + TIE * allowed(tried)
+    share = min((row.share for row in good if row.rms <= error), default=inf) + TIE
 
     def place(row: Row) -> tuple[Any, ...]:
-        if not row.safe:
-            rare = row.beyond <= beyond and isfinite(row.rms)
-            return (
-                (3, row.rms, row.share, row.label)
-                if rare
-                else (4, not isfinite(row.rms), row.beyond, row.share, row.label)
-            )
+        if all(row is not one for one in good):
+            return 3, not isfinite(row.rms), row.beyond, row.share, row.label
         if row.rms > error:
             return 2, row.rms, row.share, row.label
         if row.share > share:
@@ -157,25 +152,27 @@ def ranked(rows: Sequence[Row]) -> list[Row]:
     return [*sorted(tried, key=place), *(row for row in rows if not row.tried)]
 
 
-def _least_beyond(rows: Sequence[Row]) -> float:
-    """Share of the runs in which the best of the unsafe rows leaves the allowance, and one run more [1]."""
-    unsafe = [row for row in rows if not row.safe and isfinite(row.rms)]
-    return min((row.beyond for row in unsafe), default=1.0) + 1.0 / max((len(row.used) for row in unsafe), default=1)
+def _good(rows: Sequence[Row]) -> list[Row]:
+    """The safe rows, or, where there is none, those that leave the allowance least often, and in one run more."""
+    safe = [row for row in rows if row.safe]
+    finite = [row for row in rows if isfinite(row.rms)]
+    if safe or not finite:
+        return safe
+    rarely = min(row.beyond for row in finite) + 1.0 / max(len(row.used) for row in finite)
+    return [row for row in finite if row.beyond <= rarely]
 
 
 def contenders(rows: Sequence[Row]) -> list[Row]:
-    """The rows that may be the best ones, the best first: safe, and not far from it in their error; where nothing is
-    safe, what leaves the allowance as rarely as the best does.
+    """The rows that may be the best ones, the best first: safe, or beyond the allowance as rarely as any, and not far
+    from the best in their error.
 
     Args:
         rows: in any order.
     """
-    safe = [row for row in ranked(rows) if row.safe]
-    if not safe:
-        beyond = _least_beyond(rows)
-        return [row for row in ranked(rows) if isfinite(row.rms) and row.beyond <= beyond][:MOST]
-    limit = max(NEAR * safe[0].rms, safe[0].rms + TIE * allowed(safe))
-    return [row for row in safe if row.rms <= limit][:MOST]
+    among = _good([row for row in rows if row.tried])
+    good = [row for row in ranked(rows) if any(row is one for one in among)]
+    limit = max(NEAR * good[0].rms, good[0].rms + TIE * allowed(good)) if good else 0.0
+    return [row for row in good if row.rms <= limit][:MOST]
 
 
 def allowed(rows: Sequence[Row]) -> float:

@@ -64,13 +64,16 @@ def test_safe_ones_come_first_and_the_first_is_within_a_tie_of_the_smallest_erro
     elif any(isfinite(r.rms) for r in found):  # all have the same number of runs
         rare = min(r.beyond for r in found if isfinite(r.rms)) + 1.0 / len(found[0].used)
         assert found[0].beyond <= rare
-        assert found[0].rms == min(r.rms for r in found if r.beyond <= rare)
+        close = [r for r in found if r.rms <= min(o.rms for o in found if o.beyond <= rare) + TIE * ALLOWED]
+        assert found[0] in close
+        assert found[0].share <= min(r.share for r in close if r.beyond <= rare) + TIE
 
 
 @given(ROWS)
 def test_those_that_may_be_the_best_are_all_that_are_near_it(rows: list[Row]) -> None:
     found, safe = contenders(rows), [r for r in ranked(rows) if r.safe]
     assert found[:1] == [r for r in ranked(rows) if isfinite(r.rms)][:1]
+    assert all(r.rms <= max(NEAR * found[0].rms, found[0].rms + TIE * ALLOWED) for r in found)
     if safe:
         near = [r for r in safe if r.rms <= max(NEAR * safe[0].rms, safe[0].rms + TIE * ALLOWED)]
         assert found == near[:MOST]
