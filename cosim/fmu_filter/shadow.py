@@ -26,8 +26,9 @@ class Shadow:
     def __init__(self, own: SealedModel, restarted: SealedModel) -> None:
         self._own, self._restarted = own, restarted
         self._count, self._change = 0, np.zeros(len(own.states) + len(own.outputs))
-        self._compared: Array | None = None
-        """States and outputs at the last comparison, shape (n + q,); None before the first step."""
+        self._begun = False
+        self._compared = np.zeros(len(self._change))
+        """States and outputs at the last comparison, shape (n + q,)."""
 
     def follow(self, t: float, h: float, u: Array) -> None:
         """Make the step of the filter, without its corrections.
@@ -39,7 +40,8 @@ class Shadow:
             FmuModelError: the FMU refuses, or goes on otherwise from its states than in this run.
         """
         own = self._own
-        if self._compared is None:
+        if not self._begun:
+            self._begun = True
             own.restart(t, own.start, u)
             self._compared = np.concatenate(own.read())
         self._count += 1
@@ -61,7 +63,7 @@ class Shadow:
         """What to keep in order to return here; None where the FMU does not save its state."""
         if not self._own.instance.can_save:
             return None
-        saved = None if self._compared is None else Saved(self._own.instance)
+        saved = Saved(self._own.instance) if self._begun else None
         return saved, self._count, self._change, self._compared
 
     def restore(self, state: Any) -> bool:
@@ -76,6 +78,7 @@ class Shadow:
         if state is None:
             return False
         saved, self._count, self._change, self._compared = state
+        self._begun = saved is not None
         if saved is None:
             return True
         if saved.instance is not self._own.instance:
