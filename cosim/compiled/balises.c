@@ -201,6 +201,7 @@ static bool saved_plant(Over *over, void **state) {
     const PlantMonitor *watch = &program->watch;
     memcpy(program->balises.start, over->outputs, over->size);
     program->status = ((SaveState)program->balises.save_state)(program->slaves[watch->slave].instance, state);
+    *program->slaves[watch->slave].no_way_back = 0;
     note(program, watch->slave, CALL_SAVE, 0)->state = *state;
     return accepted(program, watch->slave, CALL_SAVE);
 }

@@ -55,12 +55,12 @@ static bool called_step(Program *program, const Slave *slave, double t, double h
         return program->status <= STATUS_WARNING;
     }
     if (slave->fmi_version == 2) {
-        program->status = ((DoStep2)slave->do_step)(slave->instance, t, h, 0);
+        program->status = ((DoStep2)slave->do_step)(slave->instance, t, h, *slave->no_way_back != 0);
         return program->status <= STATUS_WARNING;
     }
     bool event = false, terminate = false, early = false;
     double reached = t + h; /* for slaves that do not fill it in */
-    program->status = ((DoStep3)slave->do_step)(slave->instance, t, h, false, &event, &terminate, &early, &reached);
+    program->status = ((DoStep3)slave->do_step)(slave->instance, t, h, *slave->no_way_back != 0, &event, &terminate, &early, &reached);
     program->event = event;
     program->terminate = terminate;
     program->early = early;

@@ -24,7 +24,7 @@ class CSlave(ctypes.Structure):
     """`Slave`."""
 
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("instance", "do_step", "writes", "reads")),
+        *((name, ctypes.c_void_p) for name in ("instance", "do_step", "no_way_back", "writes", "reads")),
         *((name, ctypes.c_int64) for name in ("write_count", "read_count", "fmi_version", "heeds_events")),
         ("usual_step", ctypes.c_double),
         ("rounding", ctypes.c_double),

@@ -7,6 +7,7 @@ time.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -56,7 +57,7 @@ class FMI1Slave(WholeStepSlave):
                 raise RuntimeError("fmiInstantiateSlave returned no instance")
         else:
             self.slave.instantiate()
-        self._do_step = make_step(self.slave, "fmi1DoStep", *self._last)
+        self._do_step = make_step(self.slave, "fmi1DoStep", ctypes.c_char())
         self._forget()
 
     def _forget(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Mapping
 from typing import Any
 
@@ -54,11 +55,13 @@ class FMI2Instance(Instance):
 class FMI2Slave(FMI2Instance, WholeStepSlave):
     """A co-simulation slave of FMI 2.0. Arguments as for `Slave`."""
 
-    _last = (False,)  # its state may be set back: nothing of the past may be forgotten
+    @property
+    def _last(self) -> tuple[Any, ...]:  # type: ignore[override]
+        return (bool(self.no_way_back.value),)
 
     def _instantiate(self) -> None:
         super()._instantiate()
-        self._do_step = make_step(self.slave, "fmi2DoStep", *self._last)
+        self._do_step = make_step(self.slave, "fmi2DoStep", ctypes.c_int())
         if is_native(self.slave):
             quicken(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
         self._forget()

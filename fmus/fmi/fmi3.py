@@ -85,7 +85,7 @@ class FMI3Slave(FMI3Instance, Slave):
     def _instantiate(self) -> None:
         super()._instantiate()
         native = is_native(self.slave)
-        self._do_step = _native_step(self.slave) if native else self.slave.doStep
+        self._do_step = _native_step(self.slave, self.no_way_back) if native else self.slave.doStep
         if native:
             quicken(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
 
@@ -294,14 +294,15 @@ class FMI3Slave(FMI3Instance, Slave):
         return {"eventModeUsed": self.has_event_mode, "earlyReturnAllowed": early} | self._intermediate.arguments
 
 
-def _native_step(slave: Any) -> Callable[[float, float], tuple[bool, bool, bool, float]]:
+def _native_step(slave: Any, no_way_back: ctypes.c_int64) -> Callable[[float, float], tuple[bool, bool, bool, float]]:
     """fmpy's doStep of a native slave with its four results allocated once instead of at every call."""
     event, terminate, early, reached = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
     results = (ctypes.byref(event), ctypes.byref(terminate), ctypes.byref(early), ctypes.byref(reached))
-    start, length = ctypes.c_double(), ctypes.c_double()
-    call = prepared_call(slave, "fmi3DoStep", slave.component, start, length, ctypes.c_bool(False), *results)
+    start, length, flag = ctypes.c_double(), ctypes.c_double(), ctypes.c_bool()
+    call = prepared_call(slave, "fmi3DoStep", slave.component, start, length, flag, *results)
 
     def do_step(t: float, h: float) -> tuple[bool, bool, bool, float]:
+        flag.value = no_way_back.value != 0
         start.value, length.value, reached.value = t, h, t + h  # the last for slaves that do not fill it in
         call()
         return event.value, terminate.value, early.value, reached.value

@@ -66,7 +66,8 @@ class Slave(Instance):
 
     `reset` leads back to the state after `instantiate`. `time` is where it stands [s], `next_event` when something
     known in advance is due [s]; `seconds` were spent in `calls` calls of doStep; `terminated` says that the slave asked
-    for the end of the run.
+    for the end of the run. `no_way_back` is 1 until a state is saved: up to then nothing leads back before a step, as
+    each is announced (noSetFMUStatePriorToCurrentPoint); some FMUs step only so.
 
     Args:
         name: of the instance.
@@ -78,12 +79,13 @@ class Slave(Instance):
     """The slave's doStep from a time by a length [s], and with what stands in `_last`, prepared by `instantiate`."""
 
     _last: tuple[Any, ...] = ()
-    """The last argument of FMI 1 and 2, always the same."""
+    """The last argument of FMI 1 and 2."""
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
         super().__init__(name, slave, description)
         self.seconds, self.calls = 0.0, 0
         self.time, self.next_event = math.nan, NEVER
+        self.no_way_back = ctypes.c_int64(1)
         self._call_note: _CallNote = _Unnoted()
         self._step_number = 0
         self.usual_step, self.rounding = 1.0, 0.0
@@ -108,6 +110,14 @@ class Slave(Instance):
             return length
         whole = round(length / self.usual_step) * self.usual_step
         return whole if abs(length - whole) <= self.rounding else length
+
+    def save(self) -> Any:
+        self.no_way_back.value = 0
+        return super().save()
+
+    def deserialize(self, content: bytes) -> Any:
+        self.no_way_back.value = 0
+        return super().deserialize(content)
 
     def reset(self) -> None:
         """Back to the state after `instantiate`."""
@@ -252,22 +262,22 @@ def status_of(ask: Callable[[int], Any], kind: int) -> Any:
         return None
 
 
-def make_step(slave: Any, name: str, last: Any) -> Callable[[float, float, Any], None]:
+def make_step(slave: Any, name: str, flag: Any) -> Callable[[float, float, Any], None]:
     """The doStep of FMI 1 and 2 from a time by a length, both in [s], its arguments allocated once.
 
     Args:
         slave: instantiated, with fmpy's call surface.
         name: of the function in fmpy's words.
-        last: the last argument, always the same.
+        flag: the last argument as C has it, which holds the last one of each call.
     """
     if not is_native(slave):
         step: Callable[[float, float, Any], None] = slave.doStep
         return step
     start, length = ctypes.c_double(), ctypes.c_double()
-    call = prepared_call(slave, name, slave.component, start, length, last)
+    call = prepared_call(slave, name, slave.component, start, length, flag)
 
-    def do_step(t: float, h: float, _last: Any) -> None:
-        start.value, length.value = t, h
+    def do_step(t: float, h: float, last: Any) -> None:
+        start.value, length.value, flag.value = t, h, last
         call()
 
     return do_step

@@ -191,9 +191,12 @@ def test_seconds_and_calls_are_counted() -> None:
     assert np.isfinite(made.seconds)
 
 
-def test_an_fmi2_slave_is_not_notified_that_it_may_forget_its_past() -> None:
+def test_an_fmi2_slave_is_notified_that_it_may_forget_its_past_until_a_state_is_saved() -> None:
     """The localiser sets states back; a slave that had thrown its past away could not follow."""
     slave = Train2()
     made = started(slave)
     made.advance(0.0, 0.1)
+    assert slave.may_forget is True
+    made.save()
+    made.advance(0.1, 0.2)
     assert slave.may_forget is False
