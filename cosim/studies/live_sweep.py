@@ -23,9 +23,9 @@ from fmus.tables.table import Column, Table
 if TYPE_CHECKING:
     from cosim.studies.sweep_runs import SweepRun, SweepRuns
 
-MOST_ROWS = 500
+_MOST_ROWS = 500
 """Runs whose rows the page of a sweep holds; a row of 20 measures takes a kilobyte."""
-MOST_LINES = 100
+_MOST_LINES = 100
 """Lines of what failed."""
 _MOST_CURVES = 8
 """Combinations of the other values that are drawn as lines."""
@@ -65,11 +65,11 @@ def _shown_runs(result: SweepRuns) -> SweepRuns:
     """The runs whose rows the page holds, in their order: of many those that failed or are not as expected, then those
     with the largest size of the measure that the page speaks of first.
     """
-    if len(result) <= MOST_ROWS:
+    if len(result) <= _MOST_ROWS:
         return result
     column = _measure(result)
     sizes = {run.number: abs(value) for run, value in _known(result, column.key)} if column is not None else {}
-    first = sorted(result.runs, key=lambda run: (run.ending == "done", -sizes.get(run.number, np.inf)))[:MOST_ROWS]
+    first = sorted(result.runs, key=lambda run: (run.ending == "done", -sizes.get(run.number, np.inf)))[:_MOST_ROWS]
     return replace(result, runs=sorted(first, key=lambda run: run.number))
 
 
@@ -85,8 +85,8 @@ def _left_out(result: SweepRuns, shown: SweepRuns) -> list[str]:
 
 def _first_lines(lines: list[str]) -> list[str]:
     """The first lines of what failed, and how many more there are."""
-    left = len(lines) - MOST_LINES
-    return lines if left <= 0 else [*lines[:MOST_LINES], f"and {left} more, see the column failure of index.csv"]
+    left = len(lines) - _MOST_LINES
+    return lines if left <= 0 else [*lines[:_MOST_LINES], f"and {left} more, see the column failure of index.csv"]
 
 
 def _warnings(result: SweepRuns) -> list[Section]:

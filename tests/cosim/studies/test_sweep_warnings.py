@@ -131,7 +131,7 @@ def test_a_page_keeps_the_worst_of_many_runs(values: list[float | None], most: i
     ]
     result = SweepRuns(PLANT, ["train.mass"], runs)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("cosim.studies.live_sweep.MOST_ROWS", most)
+        patch.setattr("cosim.studies.live_sweep._MOST_ROWS", most)
         shown, said = rows_of(sweep_page(result, Path()))
     assert shown == sorted(shown)
     assert len(shown) == min(most, len(runs))
