@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cosim.cli.arguments import settings_argument
 from cosim.cli.scenarios import load_scenario
-from cosim.cli.trajectory import TRAJECTORY, export_trajectory
+from cosim.cli.trajectory import TRAJECTORY, export_trajectory, idle_words
 from cosim.errors import OutputError, ScenarioError
 from cosim.results.declared_units import in_si_only
 from cosim.results.formats.known_formats import format_of
@@ -67,6 +67,9 @@ def execute(options: argparse.Namespace) -> Output:
     _refuse(options, "a result", "settings", "ssp_version")
     if options.trajectory:
         return export_trajectory(options)
+    idle = idle_words(options)
+    if idle:
+        raise ScenarioError(f"{', '.join(idle)}: only with --trajectory, which is not there.")
     return _export_result(options.scenario, options)
 
 

@@ -23,7 +23,7 @@ from cosim.evaluation.reference_trajectory import (
 from cosim.results.load_result import load_result
 from cosim.results.result import Result, SignalInfo
 from cosim.results.save import save_result
-from fmus.cli.commands import ArgumentGroup, argument
+from fmus.cli.commands import Argument, ArgumentGroup, argument
 from fmus.cli.output import Output
 from fmus.tables.numbers import number
 
@@ -45,6 +45,17 @@ TRAJECTORY = ArgumentGroup(
     "the trajectory behind a recording",
     "odometer and balises, smoothed forwards and backwards: for a report that has no truth of its own",
 )
+
+
+def idle_words(options: argparse.Namespace) -> list[str]:
+    """The flags of `TRAJECTORY` that are stated although no trajectory is asked for.
+
+    Args:
+        options: of the command line.
+    """
+    others = [a for a in TRAJECTORY.arguments if isinstance(a, Argument) and a.names != ("--trajectory",)]
+    stated = {a.names[0]: getattr(options, a.names[0].lstrip("-").replace("-", "_")) for a in others}
+    return [a.names[0] for a in others if stated[a.names[0]] != a.keywords.get("default")]
 
 
 def export_trajectory(options: argparse.Namespace) -> Output:

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from cosim.cli import main
+from cosim.cli.trajectory import TRAJECTORY
 from cosim.evaluation.reference_trajectory import reference_trajectory, sampled_rows
 from cosim.results.load_result import load_result
 from fmu_observer.formulas.filtering.covariance_consistency import _is_inside
+from fmus.cli.commands import Argument
 
 STD, SCALE, BALISES = 0.05, 0.015, 250.0
 
@@ -86,3 +88,12 @@ def test_a_held_odometer_is_read_where_it_changes() -> None:
     assert sampled_rows(time, held).tolist() == list(range(0, 100, 10))
     assert len(sampled_rows(time, time)) == 100
     assert sampled_rows(np.array([0.0, 1.0, 1.0, 2.0]), np.array([1.0, 2.0, 3.0, np.nan])).tolist() == [0, 2]
+
+
+@pytest.mark.parametrize(
+    "action", [a.names[0] for a in TRAJECTORY.arguments if isinstance(a, Argument) and a.names[0] != "--trajectory"]
+)
+def test_what_is_of_a_trajectory_is_refused_without_one(action: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """It did nothing before, and said nothing of that."""
+    assert main(["export", "results/any", "any.csv", action, "3"]) == 2
+    assert capsys.readouterr().err == f"cosim: {action}: only with --trajectory, which is not there.\n"
