@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from cosim.components.stated_units import StatedUnit
 from cosim.run.plausible_masses import LIGHTEST
-from cosim.starter.guessed_signal import GuessedSignal
+from cosim.starter.guessed_signal import GuessedSignal, fits
 from cosim.starter.inspected_fmu import InspectedFmu
 from cosim.starter.probe_run import MORE, ProbeRun
 from cosim.starter.starter_roles import PlantRoles
@@ -73,7 +73,7 @@ def probe(inspected: InspectedFmu, roles: PlantRoles, run: ProbeRun) -> ProbedFa
     Args:
         inspected: what the FMU says. roles: what its signals were guessed to be. run: how it is run.
     """
-    inputs = [roles.effort.signal] if roles.effort else [s for s in inspected.inputs if s.type in FLOATING_TYPES]
+    inputs = [roles.effort.signal] if roles.effort else [s for s in inspected.inputs if _can_be_effort(s)]
     for effort in inputs[:_INPUTS]:
         response = run.respond(effort.name, {})
         if response is not None:
@@ -82,6 +82,11 @@ def probe(inspected: InspectedFmu, roles: PlantRoles, run: ProbeRun) -> ProbedFa
             if found.known.facts:
                 return found.known
     return ProbedFacts()
+
+
+def _can_be_effort(signal: GuessedSignal) -> bool:
+    """A number in no unit, or in one of a force or of a share of it: a mass flow drives no train."""
+    return signal.type in FLOATING_TYPES and (signal.meaning is None or any(fits(signal, unit) for unit in ("N", "1")))
 
 
 @dataclass

@@ -1,0 +1,37 @@
+"""Which inputs a probe run tries as the effort of a train."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from cosim.starter.guessed_signal import GuessedSignal
+from cosim.starter.probed_facts import probe
+from plant_models.hybrid.units import UnitError, parse_unit
+
+
+def _input(unit: str | None) -> GuessedSignal:
+    try:
+        meaning = None if unit is None else parse_unit(unit)
+    except UnitError:
+        meaning = None
+    return GuessedSignal("u", unit, meaning)
+
+
+@pytest.mark.parametrize(
+    ("unit", "tried"),
+    [(None, True), ("kN", True), ("%", True), ("notch", True), ("kg/s", False), ("degC", False), ("Pa", False)],
+)
+def test_what_is_measured_in_something_else_than_a_force_is_no_effort(unit: str | None, tried: bool) -> None:
+    asked: list[str] = []
+
+    def respond(name: str, _parameters: Any) -> None:
+        asked.append(name)
+
+    inspected: Any = SimpleNamespace(inputs=[_input(unit)], outputs=[], hidden=[])
+    run: Any = SimpleNamespace(respond=respond)
+    roles: Any = SimpleNamespace(effort=None)
+    assert not probe(inspected, roles, run).facts
+    assert asked == ["u"] * tried
