@@ -18,6 +18,7 @@ from pages import NOTEBOOKS, Block, blocks, code_cells
 import cosim.cli
 import fmus.cli
 import plant_models
+from fmus.pack import files_of, pack_fmu
 from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 
 PROGRAMS = {"cosim": cosim.cli.main, "fmus": fmus.cli.main}
@@ -50,9 +51,16 @@ class Load(HybridSystem):
         return {"speed": x.turning}
 
 
+def with_sources_alone(path: str) -> None:
+    """An FMU without the libraries that it was built with."""
+    files = files_of(fmus.build_fmu(Load(), path, fmi_version=3))
+    pack_fmu({name: content for name, content in files.items() if not name.startswith("binaries/")}, Path(path))
+
+
 OF_THE_READER: dict[str, Callable[[str], Any]] = {
     "vendor.fmu": lambda path: fmus.build_fmu(plant_models.Locomotive(), path, preset="chapter_3_four_axles"),
     "engine.fmu": lambda path: fmus.build_fmu(Engine(), path, fmi_version=2),
+    "with_sources.fmu": with_sources_alone,
     "load.fmu": lambda path: fmus.build_fmu(Load(), path, fmi_version=3),
 }
 """FMUs that the pages take for granted, built where a page names them and does not build them itself."""
