@@ -6,9 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import isnan, nan
 
 from cosim.components.stated_units import StatedUnit
-from cosim.run.plausible_masses import LIGHTEST
 from cosim.starter.guessed_signal import GuessedSignal, fits
 from cosim.starter.inspected_fmu import InspectedFmu
 from cosim.starter.probe_run import MORE, ProbeRun
@@ -112,7 +112,7 @@ class _Probed:
         rate = self.response.slope(motion.speed) * SPEEDS[motion.speed_unit]
         force = force_unit(abs(rate), mass)
         size = f"1 of it accelerates the train by {abs(rate):.3g} m/s2"
-        weight = f", {'a train' if mass is None else f'{mass / 1e3:.6g} t'}"
+        weight = f", {'a train' if mass is None or isnan(mass) else f'{mass / 1e3:.6g} t'}"
         turned = self._turned(rate > 0.0, motion)
         self._motion(motion, turned)
         self._state(self.effort, "effort", force, turned == "effort", size + weight)
@@ -150,11 +150,11 @@ class _Probed:
 
     def _by_effort(self, mass: float | None) -> Motion | None:
         """The speed by its name where there is no position that it is the rate of."""
-        guess, unit = self.roles.speed, self.effort.unit
+        guess, meaning = self.roles.speed, self.effort.meaning
         if guess is None or guess.signal.name not in self.response.columns or mass is None:
             return None
         rate = abs(self.response.slope(guess.signal.name))
-        for force in FORCES.values() if unit is None else (1.0,):
+        for force in FORCES.values() if meaning is None else (abs(meaning.factor),):
             found = "m/s" if guess.signal.meaning is not None else by_effort(rate, force, mass)
             if found is not None:
                 return Motion(guess.signal.name, found)
@@ -163,12 +163,14 @@ class _Probed:
     # -- the mass ----------------------------------------------------------------------------------------------------
 
     def _mass(self) -> float | None:
-        """Mass of the train [kg]; None where no parameter is one."""
+        """Mass of the train [kg]; None where no parameter is one, NaN where one is named so that no train has."""
         for signal, reason in self._masses():
             value = signal.start or 0.0
             if signal.meaning is not None:
                 return value * signal.meaning.factor
-            unit, factor = ("t", 1e3) if value < LIGHTEST else ("kg", 1.0)
+            if not _may_be_mass(signal):
+                return nan
+            unit, factor = ("t", 1e3) if value <= _HEAVY else ("kg", 1.0)
             size = f"{value:g} kg is no train" if unit == "t" else f"{value:g} t is no train"
             self._state(signal, "mass", unit, False, f"{reason}{size}")
             return value * factor

@@ -104,6 +104,17 @@ def test_a_sealed_train_is_right_at_once(system: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(outcome[f"plant.{names['speed']}"], truth, atol=1e-9)
 
 
+def test_a_mass_that_no_train_has_says_nothing_of_the_effort(tmp_path: Path) -> None:
+    """A model per unit mass: 1 is neither kilograms nor tonnes."""
+    scales = {"effort": 1.0, "position": 1.0, "speed": 1.0, "mass": 1.0}
+    system = sealed("unit_mass", {"effort": "F", "position": "s", "speed": "v", "mass": "mass"}, scales, 1.0)
+    made = write_starter(fmus.cached_fmu(system, fmi_version=2), tmp_path / "mine.toml")
+    units = tomllib.loads(made.text)["components"]["plant"]["units"]
+    assert units["v"]["unit"] == "m/s"
+    assert "mass" not in units
+    assert "unit" not in units["F"]
+
+
 class _Fails(InThisProcess):
     def each(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Ended]]:
         return ((job, Ended(failure=Failure("plant: doStep at t = 0.5 s ended the process"))) for job in jobs)
