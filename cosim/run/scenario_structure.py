@@ -35,6 +35,7 @@ from cosim.run.task import RunTask
 from cosim.scenario.schema import ScenarioTable
 from cosim.structure.run_structure import Structure
 from cosim.structure.structure_data import Balises, Link, Packets, Part, Port, Signal
+from fmus.exchange.description import SolvedCoSimulation
 
 _AT_SET_UP = "chosen at set-up"
 _COMPILED = f"{COMPILED_STAGE_TEXT} (where the run can use it)"
@@ -81,6 +82,13 @@ def _make_links(
     return tuple(links.values())
 
 
+def _abilities(component: Component) -> tuple[str, ...]:
+    """What decides what a master can do, in words."""
+    solved = isinstance(component.description.coSimulation, SolvedCoSimulation)
+    found = tuple(text for flag, text in _ABILITIES.items() if getattr(component.capabilities, flag))
+    return ("model exchange, moved by CVODE here", *found) if solved else found
+
+
 def _make_part(
     component: Component,
     connections: Sequence[Connection],
@@ -107,7 +115,7 @@ def _make_part(
         tuple(_port(component, v, taken) for v in inputs),
         tuple(_port(component, v, used, None if v.name in silent else tuple(table.get(v.name, ()))) for v in outputs),
         tuple(component.events),
-        tuple(text for flag, text in _ABILITIES.items() if getattr(component.capabilities, flag)),
+        _abilities(component),
         group,
         rate,
         tuple(chain),

@@ -18,6 +18,7 @@ from cosim.master.master import Master
 from cosim.results.result import Result
 from cosim.run.task import RunTask
 from cosim.scenario.scenario_tables import ComponentTable
+from fmus.exchange.slave import solver_of
 from fmus.versions import versions
 
 MESSAGES_SHOWN = 20
@@ -80,7 +81,8 @@ def run_summary(task: RunTask, master: Master, setup_seconds: float) -> dict[str
 
 def _component(component: Component, table: ComponentTable) -> dict[str, Any]:
     outcomes, missed = component.outcomes(), component.missed_samples()
-    return {
+    solver = solver_of(component.slave)
+    return ({} if solver is None else {"solver": solver.summary()}) | {
         "name": component.name,
         "kind": component.kind,
         "fmi_version": component.description.fmiVersion,

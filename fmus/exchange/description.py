@@ -10,6 +10,10 @@ from fmpy.model_description import CoSimulation, ModelDescription
 from fmus.fmi.standard import MODEL_EXCHANGE, STEPPED, Interface, fmi_version
 
 
+class SolvedCoSimulation(CoSimulation):
+    """What a model exchange FMU can do once a solver moves it here."""
+
+
 def stepped_by(description: ModelDescription, interface: Interface | None = None) -> str | None:
     """Which interface type of an FMU is stepped, in the words of fmpy; None where it does not offer it.
 
@@ -45,7 +49,7 @@ def as_stepped(description: ModelDescription, interface: Interface | None = None
     }
     stepped = copy(description)
     in_events = version == 3
-    stepped.coSimulation = CoSimulation(
+    stepped.coSimulation = SolvedCoSimulation(
         modelIdentifier=own.modelIdentifier,
         canHandleVariableCommunicationStepSize=True,
         hasEventMode=in_events,

@@ -105,6 +105,11 @@ class CoSimulationFunctions:
         """
         return kind == fmi2Terminated and self.motion is not None and self.motion.terminated
 
+    def summary(self) -> dict[str, Any]:
+        """Which solver it is, and how many steps it has taken since the FMU was initialised."""
+        steps = 0 if self.motion is None else self.motion.solver.steps
+        return {"name": "cvode", "method": self._method, "tolerance": self.tolerance, "steps": steps}
+
     # -- initialisation ---------------------------------------------------------------------------------------------
 
     def _set_up(self, call: Callable[..., int], instance: Any, *arguments: Any) -> int:

@@ -75,6 +75,14 @@ def test_both_steppers_give_equal_bits(tmp_path: Path, model: str, version: int)
     assert outcomes[0].result.table.tobytes() == outcomes[1].result.table.tobytes()
 
 
+def test_the_summary_and_the_structure_say_what_moves_it(tmp_path: Path) -> None:
+    s = Scenario(stop=1.0, step=0.1).add("plant", fmu=str(exchange_fmu(tmp_path, "TRAIN")), method="adams")
+    solver = s.run().result.summary["components"][0]["solver"]
+    assert (solver["name"], solver["method"], solver["tolerance"]) == ("cvode", "adams", 1e-8)
+    assert 10 <= solver["steps"] < 60
+    assert "model exchange, moved by CVODE here" in str(s.structure())
+
+
 def test_keys_of_a_solver_belong_to_an_fmu() -> None:
     with pytest.raises(CosimError, match="'method' belongs to an FMU, which a solver moves in model exchange"):
         Scenario(stop=1.0, step=0.1).add("train", model="locomotive", method="adams")
