@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.results.declared_units import in_own_units, meant_unit, own_units
+from cosim.results.formats.about import signals_of
 from cosim.results.formats.format import Format, bare
 from cosim.results.formats.headings import split_unit, with_unit
 from cosim.results.result_data import ResultData, SignalInfo
@@ -69,12 +70,13 @@ def _rows_in_python(rows: np.ndarray) -> bytes:
     return "".join([",".join(map(repr, row)) + "\n" for row in rows.tolist()]).encode()
 
 
-def _unit_above(signal: SignalInfo, is_own: bool) -> str:
-    """The unit of the heading of a column; ``1``, no unit, where it would be read as another one than it is."""
+def _heading(signal: SignalInfo, is_own: bool) -> str:
+    """A name with its unit; without it where it would be read as another one than it is."""
     if is_own and signal.declared_unit is not None:
-        return signal.declared_unit
-    read_as = split_unit(with_unit("x", signal.unit))[1] or "1"
-    return signal.unit if meant_unit(read_as) is None else "1"
+        return with_unit(signal.name, signal.declared_unit)
+    heading = with_unit(signal.name, signal.unit)
+    name, unit = split_unit(heading)
+    return heading if name == signal.name and meant_unit(unit or "1") is None else with_unit(signal.name, "1")
 
 
 class CsvFormat(Format):
@@ -88,8 +90,7 @@ class CsvFormat(Format):
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
         units = own_units(result.table, result.signals)
-        named = {s.name: _unit_above(s, s.name in units) for s in result.signals}
-        headings = [with_unit(name, named.get(name, "1")) for name in column_names(result.table)[1:]]
+        headings = [_heading(signal, signal.name in units) for signal in signals_of(result)]
         write_csv(path, result.table, ["time", *headings], lambda rows: in_own_units(rows, units))
 
     @staticmethod
