@@ -10,7 +10,7 @@ from fmpy.model_description import CoSimulation, ModelDescription
 from fmus.fmi.standard import MODEL_EXCHANGE, STEPPED, Interface, fmi_version
 
 
-class SolvedCoSimulation(CoSimulation):
+class SolvedCoSimulation(CoSimulation):  # type: ignore[misc]
     """What a model exchange FMU can do once a solver moves it here."""
 
 

@@ -216,7 +216,7 @@ def _limits() -> dict[int, tuple[float, float]] | None:
     if resource is None:
         return None
     infinite = {resource.RLIM_INFINITY: math.inf}
-    return {n: tuple(infinite.get(x, x) for x in resource.getrlimit(n)) for n in _RESOURCES}  # type: ignore[misc]
+    return {n: tuple(infinite.get(x, x) for x in resource.getrlimit(n)) for n in _RESOURCES}
 
 
 def _lower_limits(before: dict[int, tuple[float, float]], now: dict[int, tuple[float, float]]) -> str:
@@ -229,7 +229,7 @@ def _raise_limits(before: dict[int, tuple[float, float]]) -> None:
     infinite = {math.inf: resource.RLIM_INFINITY}
     for number, (soft, hard) in before.items():
         with suppress(OSError, ValueError):
-            resource.setrlimit(number, (infinite.get(soft, soft), infinite.get(hard, hard)))  # type: ignore[arg-type]
+            resource.setrlimit(number, (infinite.get(soft, soft), infinite.get(hard, hard)))
 
 
 def _mask() -> int:
