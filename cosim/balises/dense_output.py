@@ -80,8 +80,8 @@ class _Part(StepSearch):
     """One internal step of a solver, at any instant of which the plant can be put."""
 
     def __init__(self, localiser: Localiser, t: float, motion: HermiteStep, solver: CoSimulationFunctions) -> None:
-        super().__init__(localiser, t, motion)
-        self._solver = solver
+        self.watch, self._hides, self._solver = localiser.watch, localiser.hides, solver
+        self.t, self._hermite = t, motion
 
     def go(self, time: float) -> None:
         self._solver.look(time if time - self.t > TIME_TOLERANCE else self.t)

@@ -69,8 +69,8 @@ class _Trial(StepSearch):
     """One step that may be taken again and again, from a saved state. Made with the step already taken once."""
 
     def __init__(self, localiser: RollbackLocaliser, t: float, until: float) -> None:
-        watch = localiser.watch
-        self.until, self.tries = until, 0
+        watch = self.watch = localiser.watch
+        self._hides, self.t, self.until, self.tries = localiser.hides, t, until, 0
         begin = watch.motion
         self._start = watch.outputs.copy()
         self._state: Any = watch.save()
@@ -80,7 +80,7 @@ class _Trial(StepSearch):
             watch.release(self._state)
             raise
         self._final = watch.outputs.copy()
-        super().__init__(localiser, t, HermiteStep(until - t, *begin, *watch.motion))
+        self._hermite = HermiteStep(until - t, *begin, *watch.motion)
 
     def go(self, time: float) -> None:
         self.tries += 1

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import NamedTuple
 
 from cosim.balises.hermite import HermiteStep, Segment
 from cosim.balises.layout import Balise, InstantLayout, TrackLayout
-from cosim.balises.localiser import ACCELERATION_LIMIT, SHORTEST_PART, Localiser
+from cosim.balises.localiser import ACCELERATION_LIMIT, SHORTEST_PART
+from cosim.balises.plant_monitor import PlantMonitor
 from fmus.fmi.standard import TIME_TOLERANCE
 
 ROOT_TOLERANCE = 1e-11
@@ -47,13 +49,14 @@ class _Part(NamedTuple):
 class StepSearch(ABC):
     """A step within which crossings are searched; `go` puts the plant at an instant of it, with its outputs read.
 
-    Args:
-        localiser: whose plant it is. t: begin of the step [s]. motion: the plant's at both ends.
+    Who makes one says where it begins (`t` [s]), how the plant moves between both ends, and what its localiser knows:
+    once for each balise, so it is set here without a call.
     """
 
-    def __init__(self, localiser: Localiser, t: float, motion: HermiteStep) -> None:
-        self.watch, self._hides = localiser.watch, localiser.hides
-        self.t, self._hermite = t, motion
+    watch: PlantMonitor
+    t: float
+    _hermite: HermiteStep
+    _hides: Callable[[HermiteStep], bool]
 
     @abstractmethod
     def go(self, time: float) -> None:
