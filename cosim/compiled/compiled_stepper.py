@@ -113,7 +113,7 @@ class CompiledStepper:
         self._program.count_rows_at(recorder.count_address, recorder.block_start)
         self._first = k
         run = self._library.stepper_run
-        done = int(run(self._address, k, k + wanted, rows.ctypes.data, len(rows)))
+        done = int(run(self._address, k, k + wanted, rows.__array_interface__["data"][0], len(rows)))
         self._first = None
         recorder.commit(int(head.rows_done))
         self.steps += done

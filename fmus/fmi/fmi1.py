@@ -38,7 +38,6 @@ class FMI1Slave(WholeStepSlave):
 
     fmi_version = 1
     event_needs_step = True
-    _last = (TRUE,)  # each step is new, none is repeated
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
         super().__init__(name, slave, description)
@@ -57,7 +56,7 @@ class FMI1Slave(WholeStepSlave):
                 raise RuntimeError("fmiInstantiateSlave returned no instance")
         else:
             self.slave.instantiate()
-        self._do_step = make_step(self.slave, "fmi1DoStep", ctypes.c_char())
+        self._do_step = make_step(self.slave, "fmi1DoStep", ctypes.c_char(TRUE))  # each step is new
         self._forget()
 
     def _forget(self) -> None:

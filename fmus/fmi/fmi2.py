@@ -55,13 +55,10 @@ class FMI2Instance(Instance):
 class FMI2Slave(FMI2Instance, WholeStepSlave):
     """A co-simulation slave of FMI 2.0. Arguments as for `Slave`."""
 
-    @property
-    def _last(self) -> tuple[Any, ...]:  # type: ignore[override]
-        return (bool(self.no_way_back.value),)
-
     def _instantiate(self) -> None:
         super()._instantiate()
-        self._do_step = make_step(self.slave, "fmi2DoStep", ctypes.c_int())
+        self._last = () if is_native(self.slave) else (bool(self.no_way_back.value),)
+        self._do_step = make_step(self.slave, "fmi2DoStep", ctypes.c_int(), self.no_way_back)
         if is_native(self.slave):
             quicken(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
         self._forget()
@@ -80,6 +77,8 @@ class FMI2Slave(FMI2Instance, WholeStepSlave):
         self.guard(f"count of event '{event.name}'", self.slave.setInteger, [event.trigger], [count])
 
     def _remember(self) -> tuple[Any, ...]:
+        self.no_way_back.value = 0
+        self._last = self._last and (False,)
         return dict(self._counts), self.time, self.terminated
 
     def _recall(self, remembered: tuple[Any, ...]) -> None:

@@ -107,7 +107,8 @@ class FMI3Slave(FMI3Instance, Slave):
         note.call[0], note.time[0] = self._step_number, t
         begin = perf_counter()
         try:
-            event, terminate, early, reached = self._do_step(t, self.step_length(t, until))
+            length = self.step_length(t, until) if self.rounding else until - t
+            event, terminate, early, reached = self._do_step(t, length)
             if self._intermediate.requested:
                 self._intermediate.check()
         except self.mistakes:
@@ -282,6 +283,7 @@ class FMI3Slave(FMI3Instance, Slave):
         self.enter_step_mode()
 
     def _remember(self) -> tuple[Any, ...]:
+        self.no_way_back.value = 0
         return self.next_event, self.time, self.terminated, self.event_pending, self.clocks.save()
 
     def _recall(self, remembered: tuple[Any, ...]) -> None:

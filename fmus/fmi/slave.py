@@ -79,7 +79,7 @@ class Slave(Instance):
     """The slave's doStep from a time by a length [s], and with what stands in `_last`, prepared by `instantiate`."""
 
     _last: tuple[Any, ...] = ()
-    """The last argument of FMI 1 and 2."""
+    """The last argument of a slave in Python, in FMI 2."""
 
     def __init__(self, name: str, slave: Any, description: ModelDescription) -> None:
         super().__init__(name, slave, description)
@@ -106,18 +106,8 @@ class Slave(Instance):
         that, this multiple.
         """
         length = until - t
-        if not self.rounding:
-            return length
         whole = round(length / self.usual_step) * self.usual_step
         return whole if abs(length - whole) <= self.rounding else length
-
-    def save(self) -> Any:
-        self.no_way_back.value = 0
-        return super().save()
-
-    def deserialize(self, content: bytes) -> Any:
-        self.no_way_back.value = 0
-        return super().deserialize(content)
 
     def reset(self) -> None:
         """Back to the state after `instantiate`."""
@@ -220,7 +210,7 @@ class WholeStepSlave(Slave):
         note.call[0], note.time[0] = self._step_number, t
         begin = perf_counter()
         try:
-            self._do_step(t, self.step_length(t, until), *self._last)
+            self._do_step(t, self.step_length(t, until) if self.rounding else until - t, *self._last)
             self.time = until
         except FMICallException as error:
             if error.status == PENDING:
@@ -262,22 +252,24 @@ def status_of(ask: Callable[[int], Any], kind: int) -> Any:
         return None
 
 
-def make_step(slave: Any, name: str, flag: Any) -> Callable[[float, float, Any], None]:
+def make_step(slave: Any, name: str, flag: Any, no_way_back: ctypes.c_int64 | None = None) -> Callable[..., None]:
     """The doStep of FMI 1 and 2 from a time by a length, both in [s], its arguments allocated once.
 
     Args:
         slave: instantiated, with fmpy's call surface.
         name: of the function in fmpy's words.
-        flag: the last argument as C has it, which holds the last one of each call.
+        flag: the last argument as C has it. no_way_back: what it follows, if anything.
     """
     if not is_native(slave):
-        step: Callable[[float, float, Any], None] = slave.doStep
+        step: Callable[..., None] = slave.doStep
         return step
     start, length = ctypes.c_double(), ctypes.c_double()
     call = prepared_call(slave, name, slave.component, start, length, flag)
 
-    def do_step(t: float, h: float, last: Any) -> None:
-        start.value, length.value, flag.value = t, h, last
+    def do_step(t: float, h: float) -> None:
+        start.value, length.value = t, h
+        if no_way_back is not None:
+            flag.value = no_way_back.value != 0
         call()
 
     return do_step
