@@ -202,7 +202,7 @@ class _Exporter:
     def checked(self, fmu: Path, name: str, table: ComponentTable) -> ModelDescription:
         """The description of an FMU, arrays as its structural parameters make them, once its parameters fit."""
         try:
-            component = describe_fmu(fmu, name, table.units)
+            component = describe_fmu(fmu, name, table.units, table.interface)
             seed = component_seed(component, table.parameters, self.table.seed)
             start_values(component, table.parameters | seed)
             self.seeds[name] = {} if self.table.seed == RUN_SEED else seed  # else the FMU finds the same by its name
@@ -213,6 +213,8 @@ class _Exporter:
     def add_component(self, parent: Node, name: str, part: _ExportedPart, more: Mapping[str, Any]) -> None:
         """A component with its connectors, parameters and origin, and what else its annotation says."""
         node = child(parent, "ssd", "Component", name=name, type="application/x-fmu-sharedlibrary", source=part.member)
+        if part.table.interface is not None:
+            node.set("implementation", {"co-simulation": "CoSimulation"}.get(part.table.interface, "ModelExchange"))
         variables = [v for v in part.interface.variables.values() if v.causality in ("input", "output")]
         if variables:
             connectors = child(node, "ssd", "Connectors")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from cosim.ssp.common import Step, Type
 from cosim.ssp.document import Node
+from fmus.fmi.standard import Interface
 
 
 @dataclass(frozen=True)
@@ -112,11 +113,13 @@ class ComponentElement(SsdElement):
 
     Args:
         fmu: the unpacked file. member: its name in the package. extras: what our own annotation says of it.
+        interface: which one is stepped; None for co-simulation, and model exchange where there is nothing else.
     """
 
     fmu: Path
     member: str
     extras: Mapping[str, object]
+    interface: Interface | None
 
 
 @dataclass

@@ -137,6 +137,7 @@ def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], lapses: La
         extras = {key: value for key, value in extras.items() if key not in ORIGIN}
     if "model" not in extras and "observer" not in extras:
         extras["fmu"] = str(element.fmu)
+        extras |= {} if element.interface is None else {"interface": element.interface}
     own = {name: value for name, value in parameters.items() if name not in LATE_PARAMETERS & extras.keys()}
     return extras | ({"parameters": own} if own else {})
 

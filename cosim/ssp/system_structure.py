@@ -24,10 +24,17 @@ from cosim.ssp.package_data import (
     SsdStructure,
     SystemElement,
 )
+from fmus.fmi.standard import Interface
 
 FMU = "application/x-fmu-sharedlibrary"
 _DEFINITION, _PACKAGE = "application/x-ssp-definition", "application/x-ssp-package"
-_IMPLEMENTATIONS = ("any", "CoSimulation")
+_IMPLEMENTATIONS: dict[str, Interface | None] = {
+    "any": None,
+    "CoSimulation": None,  # what is stepped where an FMU offers both
+    "ModelExchange": "model-exchange",
+}
+"""Which interface of an FMU is stepped, by what a package says of its component; None where nothing is to be said."""
+
 _DEEPEST = 64
 Kind = TypeVar("Kind")
 
@@ -141,7 +148,7 @@ class _Reader:
         if implementation not in _IMPLEMENTATIONS:
             fail(
                 node,
-                f"component {node.get('name')!r} asks for {implementation}; this master steps co-simulation FMUs only.",
+                f"component {node.get('name')!r} asks for {implementation}; expected {', '.join(_IMPLEMENTATIONS)}.",
             )
         member = self.package.member(node, source, self.member)
         return ComponentElement(
@@ -152,6 +159,7 @@ class _Reader:
             fmu=self.package.file(member),
             member=member,
             extras=read_extras(node),
+            interface=_IMPLEMENTATIONS[implementation],
         )
 
     def reference(self, node: Node) -> DictionaryReference:

@@ -101,7 +101,10 @@ WRONG = {
     ),
     "no source": (UNSOURCED, "component 'ramp' has no source"),
     "other type": (changed('name="ramp"', 'name="ramp" type="text/x-modelica"'), "is of type 'text/x-modelica'"),
-    "model exchange": (changed('name="ramp"', 'name="ramp" implementation="ModelExchange"'), "asks for ModelExchange"),
+    "scheduled execution": (
+        changed('name="ramp"', 'name="ramp" implementation="ScheduledExecution"'),
+        "ScheduledExecution",
+    ),
     "two elements of one name": (
         changed('name="sum"', 'name="ramp"'),
         "line 5: system 'root' has two elements named 'ramp'",

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import gc
 import json
+import re
 import zipfile
 from importlib.resources import files
 from pathlib import Path
@@ -18,6 +19,7 @@ import pytest
 from lxml import etree
 from small_scenarios import small
 from ssp_files import connector, described_fmu, ramp_fmu, sum_fmu
+from test_fmus.exchange import exchange_fmu
 
 from cosim import Scenario
 from cosim.cli import main
@@ -47,6 +49,29 @@ def pair(folder: Path, version: Any = 2) -> Scenario:
     scenario.add("ramp", fmu=str(ramp_fmu(folder, version)), parameters={"x0[1]": 0.1})
     scenario.add("sum", fmu=str(sum_fmu(folder, version)), parameters={"w": 1.0 / 3.0}, record=["w"])
     return scenario.connect("ramp.speed -> sum.u")
+
+
+@pytest.mark.compiler
+@pytest.mark.parametrize("version", ["1.0", "2.0"])
+@pytest.mark.parametrize("interface", ["model-exchange", None])
+def test_a_model_exchange_fmu_runs_equally_after_the_round_trip(
+    tmp_path: Path, version: str, interface: str | None
+) -> None:
+    """Also from a package of others, which states what it asks for in the standard's words alone."""
+    scenario = Scenario(stop=1.0, step=0.125, title="ball")
+    keys = {} if interface is None else {"interface": interface}
+    scenario.add("ball", fmu=str(exchange_fmu(tmp_path, "BALL", 2)), **keys)
+    path = scenario.export_ssp(tmp_path / "ball.ssp", version)
+    assert_valid(path, version)
+    assert (b'implementation="ModelExchange"' in texts(path)["SystemStructure.ssd"]) == (interface is not None)
+    plain = re.sub(rb"<ssd:Annotations>.*?</ssd:Annotations>", b"", texts(path)["SystemStructure.ssd"], flags=re.DOTALL)
+    with zipfile.ZipFile(tmp_path / "plain.ssp", "w") as archive:
+        for name, text in (texts(path) | {"SystemStructure.ssd": plain}).items():
+            archive.writestr(name, text)
+    expected = scenario.run().result.table
+    for package in (path, tmp_path / "plain.ssp"):
+        again = Scenario.load(package).set("stop", 1.0).set("step", 0.125).run().result.table
+        assert np.array_equal(again, expected)
 
 
 @pytest.mark.compiler
