@@ -212,9 +212,13 @@ def test_who_interrupts_a_study_ends_its_jobs_on_the_cluster(
         os.kill(os.getpid(), signal.SIGINT)
 
     with make_executor(scheduler=workers[0]) as there:
+        before = signal.signal(
+            signal.SIGINT, signal.default_int_handler
+        )  # ignored where the tests run in the background
         threading.Thread(target=interrupt, daemon=True).start()
         with pytest.raises(KeyboardInterrupt):
             list(there.each([Task(linger, str(begun)) for _ in range(8)]))
+        signal.signal(signal.SIGINT, before)
         since = time.monotonic()
         assert [ended.row for _, ended in there.each([Task(square, 2), Task(square, 3)])] in ([4, 9], [9, 4])
         assert time.monotonic() - since < 60.0  # of the 120 s that a job lasts
