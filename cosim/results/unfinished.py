@@ -9,6 +9,11 @@ from pathlib import Path
 
 from cosim.errors import OutputError
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
 UNFINISHED = ".unfinished"
 """The folder, within that of the results, to which a run is streamed in case its process dies."""
 
@@ -30,11 +35,9 @@ def only_run(directory: Path) -> Iterator[None]:
     Raises:
         OutputError: another run is writing to it.
     """
-    if os.name != "posix":
+    if fcntl is None:
         yield
         return
-    import fcntl  # noqa: PLC0415 - POSIX only
-
     descriptor = os.open(directory, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -13,7 +13,7 @@ from cosim.starter.guessed_signal import GuessedSignal, fits
 from cosim.starter.inspected_fmu import InspectedFmu
 from cosim.starter.probe_run import MORE, ProbeRun
 from cosim.starter.starter_roles import PlantRoles
-from cosim.starter.step_response import FORCES, SPEEDS, Motion, StepResponse, find_motion, force_unit, wheel_unit
+from cosim.starter.step_response import FORCES, SPEEDS, FoundMotion, StepResponse, find_motion, force_unit, wheel_unit
 from cosim.starter.step_response import speed_unit_by_effort as by_effort
 from fmus.fmi.types import FLOATING_TYPES
 
@@ -118,7 +118,7 @@ class _Probed:
         self._state(self.effort, "effort", force, turned == "effort", size + weight)
         self._wheel(motion, turned == "speed")
 
-    def _motion(self, motion: Motion, turned: str) -> None:
+    def _motion(self, motion: FoundMotion, turned: str) -> None:
         signals = {s.name: s for s in (*self.inspected.outputs, *self.inspected.hidden)}
         reason = f"its rate is the effort by the mass, in {motion.speed_unit}"
         if motion.position is not None:
@@ -127,13 +127,13 @@ class _Probed:
             self._state(signals[motion.position], "position", motion.position_unit, turned == "position", reason)
         self._state(signals[motion.speed], "speed", motion.speed_unit, turned == "speed", reason)
 
-    def _turned(self, follows: bool, motion: Motion) -> str:
+    def _turned(self, follows: bool, motion: FoundMotion) -> str:
         """Which of the three counts in the other direction than both others."""
         if motion.agree < 0:
             return "position" if follows else "speed"
         return "" if follows else "effort"
 
-    def _wheel(self, motion: Motion, turned: bool) -> None:
+    def _wheel(self, motion: FoundMotion, turned: bool) -> None:
         """Another output that grows with the speed, as that of a wheel does."""
         named = [] if self.roles.wheel_speed is None else [self.roles.wheel_speed.signal.name]
         signals = {s.name: s for s in self.inspected.outputs if s.unit is None and s.name != motion.speed}
@@ -148,7 +148,7 @@ class _Probed:
                 self._state(signals[name], "wheel_speed", unit, (ratio < 0.0) != turned, reason)
                 return
 
-    def _by_effort(self, mass: float | None) -> Motion | None:
+    def _by_effort(self, mass: float | None) -> FoundMotion | None:
         """The speed by its name where there is no position that it is the rate of."""
         guess, meaning = self.roles.speed, self.effort.meaning
         if guess is None or guess.signal.name not in self.response.columns or mass is None:
@@ -157,7 +157,7 @@ class _Probed:
         for force in FORCES.values() if meaning is None else (abs(meaning.factor),):
             found = "m/s" if guess.signal.meaning is not None else by_effort(rate, force, mass)
             if found is not None:
-                return Motion(guess.signal.name, found)
+                return FoundMotion(guess.signal.name, found)
         return None
 
     # -- the mass ----------------------------------------------------------------------------------------------------

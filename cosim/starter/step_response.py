@@ -66,7 +66,7 @@ class StepResponse:
 
 
 @dataclass(frozen=True)
-class Motion:
+class FoundMotion:
     """Speed and position of the train.
 
     Args:
@@ -81,7 +81,7 @@ class Motion:
     agree: int = 1
 
 
-def find_motion(response: StepResponse, declared: Sequence[str], named: Sequence[str]) -> Motion | None:
+def find_motion(response: StepResponse, declared: Sequence[str], named: Sequence[str]) -> FoundMotion | None:
     """The pair of position and speed whose rates fit in units that trains have.
 
     Args:
@@ -92,7 +92,7 @@ def find_motion(response: StepResponse, declared: Sequence[str], named: Sequence
         The pair, or None where there is none.
     """
     pairs = [
-        Motion(speed, its, position, other, sign)
+        FoundMotion(speed, its, position, other, sign)
         for speed in response.speeds()
         for position in response.columns
         if (k := response.integral_factor(position, speed)) is not None and response.order(position) > 1.3

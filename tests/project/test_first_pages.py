@@ -50,6 +50,5 @@ def test_the_script_makes_sense_from_the_first_balise_on(tmp_path: Path, monkeyp
     slip = np.abs(outcome["train.wheel_speed"] - outcome["train.speed"]).max()
     assert 0.0 < measures["observer.speed_error_max"] < 1.2 * slip < 0.5
     assert measures["observer.position_error_max"] < 5.0
-    assert np.abs(outcome["observer.creep"]).max() < 0.2
     assert len(outcome.result.events) >= 5
     assert outcome.spec.odometer == "odometer.reading"

@@ -11,7 +11,7 @@ from cosim.starter.step_response import (
     FORCES,
     LENGTHS,
     SPEEDS,
-    Motion,
+    FoundMotion,
     StepResponse,
     find_motion,
     force_unit,
@@ -50,7 +50,7 @@ def test_position_and_speed_are_found_in_their_units(
     speed: str, length: str, sign: int, direction: int, lag: float, drag: float
 ) -> None:
     found = response(0.3, lag, drag, a=1.0, p=direction / LENGTHS[length], v=direction * sign / SPEEDS[speed])
-    assert find_motion(found, [], []) == Motion("v", speed, "p", length, sign)
+    assert find_motion(found, [], []) == FoundMotion("v", speed, "p", length, sign)
 
 
 @given(lag=st.floats(0.01, 0.8))
@@ -68,7 +68,7 @@ def test_names_decide_between_equal_pairs() -> None:
 
 def test_a_declared_speed_is_in_si() -> None:
     found = response(0.3, 0.1, 0.0, p=1.0, v=1.0)
-    assert find_motion(found, ["v", "p"], []) == Motion("v", "m/s", "p", "m", 1)
+    assert find_motion(found, ["v", "p"], []) == FoundMotion("v", "m/s", "p", "m", 1)
     assert find_motion(response(0.3, 0.1, 0.0, p=1.0, v=3.6), ["v", "p"], []) is None
 
 
