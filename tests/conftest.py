@@ -178,7 +178,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Mark as slow what says so and what takes long, and draw the sample where it is asked for."""
     for item in items:
         declared = any(mark.name in SECOND for mark in item.iter_markers())
-        if declared or (not config.option.measure and tiers.is_dear(item.nodeid)):
+        dear = tiers.is_dear(item.nodeid) and not item.get_closest_marker("guard")
+        if declared or (not config.option.measure and dear):
             item.add_marker(pytest.mark.slow)
     if "sample" in config.option.markexpr:
         for item in _sample(items, os.environ[SEED]):

@@ -6,10 +6,13 @@ import ast
 from collections import defaultdict
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("plant_models", "fmu_observer", "fmus", "cosim")
 
 
+@pytest.mark.guard
 def test_every_public_class_name_stands_once() -> None:
     places: dict[str, list[str]] = defaultdict(list)
     for path in (path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))):

@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+import pytest
 from pages import PACKAGES, ROOT
 
 HIDDEN_AT_MOST = 40
@@ -80,6 +81,7 @@ def test_no_files_import_one_another_in_a_circle() -> None:
     assert circles == {}
 
 
+@pytest.mark.guard
 def test_few_imports_hide_in_functions() -> None:
     hidden = [
         f"{module}:{one.line}: {', '.join(one.names)}"
