@@ -80,11 +80,13 @@ static bool drive(Program *program, int64_t which, double t, double until) {
     return arrive(program, which, until) && read_outputs(program, which);
 }
 
-/* Restore or release a state: the one takes the state, the other where it is kept. */
+/* Restore or release the state at the start of the step: the one takes the state, the other where it is kept. */
 static bool state_call(Over *over, int64_t call, void *function, void *state) {
     Program *program = over->program;
     Slave *plant = &program->slaves[program->watch.slave];
     program->status = ((RestoreState)function)(plant->instance, state);
+    if (call == CALL_RESTORE)
+        *plant->left_at = plant->left_here;
     note(program, program->watch.slave, call, 0);
     return accepted(program, program->watch.slave, call);
 }
@@ -411,6 +413,7 @@ static int64_t step_over(Program *program, double t, double until, double *rows,
     for (int64_t i = 0; i < program->slave_count; i++) {
         program->slaves[i].calls_here = program->slaves[i].returns_here = 0;
         program->slaves[i].now = t;
+        program->slaves[i].left_here = *program->slaves[i].left_at;
     }
     begin_step(program);
     program->journal.count = program->journal.used = 0;
@@ -419,6 +422,8 @@ static int64_t step_over(Program *program, double t, double until, double *rows,
     program->journal.on = 0;
     if (!ordinary) {
         memcpy(program->values, start_of(program), (size_t)program->value_count * sizeof(double));
+        for (int64_t i = 0; i < program->slave_count; i++)
+            *program->slaves[i].left_at = program->slaves[i].left_here;
         stopped(program, STOP_HANDED, 0, 0);
         return -1;
     }

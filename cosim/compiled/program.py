@@ -164,7 +164,7 @@ class Program:
             return said
         version = self.plan.steps[which].component.fmi_version
         results: tuple[Any, ...] = (False, False, False, math.inf)  # arrived, as it did
-        if stop is Stop.STEP:
+        if stop is Stop.STEP or head.early:
             results = bool(head.event), bool(head.terminate), bool(head.early), float(head.reached)
         early = [RecordedReturn(0, (False, False, True, reached)) for reached in head.returns[: head.return_count]]
         last = RecordedReturn(head.status if stop is Stop.STEP else 0, results if version == FMI3 else ())
@@ -211,7 +211,7 @@ class Program:
         outputs = [s.name.removeprefix(f"{component.name}.") for s in self.plan.signals[step.columns]]
         made = CSlave(instance=instance, fmi_version=component.fmi_version)
         made.do_step = self.function(component, f"fmi{component.fmi_version}DoStep")
-        made.no_way_back = ctypes.addressof(component.no_way_back)
+        made.no_way_back, made.left_at = map(ctypes.addressof, (component.no_way_back, component.left_at))
         made.numbers = LAST_CALL.numbers(component.name)
         made.returns_early = component.capabilities.mightReturnEarlyFromDoStep
         made.usual_step, made.rounding = component.usual_step, component.rounding

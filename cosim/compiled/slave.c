@@ -84,11 +84,12 @@ static void about_to(const Program *program, const Slave *slave, int64_t what) {
     *program->last_call = slave->numbers + what;
 }
 
-/* Whether a slave has only stopped on the way to `until` [s], as FMI 3 allows it, and nothing is to be seen to: it is stepped on. */
+/* Whether a slave has only stopped on the way to `until` [s], as FMI 3 allows it, and nothing is to be seen to: it is stepped on, or has
+   arrived but for a tolerance. */
 static bool returned_early(const Program *program, const Slave *slave, double t, double until) {
     if (slave->fmi_version != 3 || program->status > STATUS_WARNING || !program->early || program->terminate || (program->event && slave->heeds_events))
         return false;
-    return program->reached > t + TIME_TOLERANCE && program->reached < until - TIME_TOLERANCE;
+    return program->reached > t && program->reached <= until + TIME_TOLERANCE;
 }
 
 static void note_step(Program *program, int64_t which, bool ordinary) {
@@ -107,11 +108,14 @@ static double step_length(const Slave *slave, double t, double until) {
     return slave->rounding != 0.0 && fabs(length - whole) <= slave->rounding ? whole : length;
 }
 
-/* From `t` to `until` [s], in as many calls as the slave needs. True where nothing is to be seen to. */
+/* From `t` to `until` [s], in as many calls as the slave needs; the first begins where an early return left the last step. True where
+   nothing is to be seen to. */
 static bool do_step(Program *program, int64_t which, double t, double until) {
     Slave *slave = &program->slaves[which];
     about_to(program, slave, LAST_STEP);
     program->return_count = 0;
+    if (*slave->left_at < t)
+        t = *slave->left_at;
     for (;;) {
         bool ordinary = called_step(program, slave, t, step_length(slave, t, until));
         accepted(program, which, CALL_STEP);
@@ -120,8 +124,12 @@ static bool do_step(Program *program, int64_t which, double t, double until) {
         const bool goes_on = !ordinary && returned_early(program, slave, t, until);
         if (slave->fmi_version == 3 && (ordinary || goes_on))
             note_contradictions(program, slave, t, until);
+        if (ordinary || (goes_on && program->reached >= until - TIME_TOLERANCE)) {
+            *slave->left_at = goes_on ? fmin(program->reached, until) : INFINITY;
+            return true;
+        }
         if (!goes_on)
-            return ordinary;
+            return false;
         if (program->return_count == RETURNS_AT_MOST || (program->journal.on && program->journal.count >= program->journal.returns_up_to))
             return false;
         t = program->reached;

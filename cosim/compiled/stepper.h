@@ -88,6 +88,7 @@ typedef struct {
     void *instance;
     void *do_step;
     int64_t *no_way_back;              /* nothing was saved so far: no step leads back before the begin of this one */
+    double *left_at;                   /* FMI 3: where an early return just before its end left the last step [s], else infinite */
     Port *writes, *reads;
     int64_t write_count, read_count;
     int64_t fmi_version;
@@ -104,6 +105,7 @@ typedef struct {
     int64_t sampled_calls[BINS];
     /* in steps over balises, which are all timed */
     double now;                        /* where it stands [s] */
+    double left_here;                  /* `left_at` at the start of the present step */
     int64_t calls_here, more_calls;    /* of doStep in the present step; in all of them, beyond one for each step */
     double seconds_over;
     int64_t returns_here, returns;     /* calls of doStep after an early return: in the present step; in all steps but those of events */

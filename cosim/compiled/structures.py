@@ -24,7 +24,7 @@ class CSlave(ctypes.Structure):
     """`Slave`."""
 
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("instance", "do_step", "no_way_back", "writes", "reads")),
+        *((name, ctypes.c_void_p) for name in ("instance", "do_step", "no_way_back", "left_at", "writes", "reads")),
         *((name, ctypes.c_int64) for name in ("write_count", "read_count", "fmi_version", "heeds_events")),
         ("usual_step", ctypes.c_double),
         ("rounding", ctypes.c_double),
@@ -35,6 +35,7 @@ class CSlave(ctypes.Structure):
         ("sampled_seconds", ctypes.c_double * BINS),
         ("sampled_calls", ctypes.c_int64 * BINS),
         ("now", ctypes.c_double),
+        ("left_here", ctypes.c_double),
         ("calls_here", ctypes.c_int64),
         ("more_calls", ctypes.c_int64),
         ("seconds_over", ctypes.c_double),

@@ -104,6 +104,7 @@ class FMI3Slave(FMI3Instance, Slave):
             RunError: doStep failed, or says that it reached a time outside the step.
         """
         note = self._call_note
+        t = min(t, self.left_at.value)
         note.call[0], note.time[0] = self._step_number, t
         begin = perf_counter()
         try:
@@ -127,11 +128,11 @@ class FMI3Slave(FMI3Instance, Slave):
             early = early or t + TIME_TOLERANCE < reached < until - TIME_TOLERANCE
         # lastSuccessfulTime may then be that of an internal step: the slave stands where it was asked to go
         if not early:
-            self.time = until
+            self.time, self.left_at.value = until, math.inf
             return until, event
         if not t - TIME_TOLERANCE <= reached <= until + TIME_TOLERANCE:
             raise self.failure(f"doStep to {until:g} s says that it reached {reached!r} s", t)
-        self.time = min(max(float(reached), t), until)
+        self.time = self.left_at.value = min(max(float(reached), t), until)
         return self.time, event
 
     def _note_contradictions(self, t: float, *said: bool) -> None:
@@ -284,10 +285,11 @@ class FMI3Slave(FMI3Instance, Slave):
 
     def _remember(self) -> tuple[Any, ...]:
         self.no_way_back.value = 0
-        return self.next_event, self.time, self.terminated, self.event_pending, self.clocks.save()
+        stands = self.time, self.left_at.value
+        return self.next_event, *stands, self.terminated, self.event_pending, self.clocks.save()
 
     def _recall(self, remembered: tuple[Any, ...]) -> None:
-        self.next_event, self.time, self.terminated, self.event_pending, clocks = remembered
+        self.next_event, self.time, self.left_at.value, self.terminated, self.event_pending, clocks = remembered
         if clocks:
             self.clocks.restore(clocks)
 

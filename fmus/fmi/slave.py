@@ -67,7 +67,9 @@ class Slave(Instance):
     `reset` leads back to the state after `instantiate`. `time` is where it stands [s], `next_event` when something
     known in advance is due [s]; `seconds` were spent in `calls` calls of doStep; `terminated` says that the slave asked
     for the end of the run. `no_way_back` is 1 until a state is saved: up to then nothing leads back before a step, as
-    each is announced (noSetFMUStatePriorToCurrentPoint); some FMUs step only so.
+    each is announced (noSetFMUStatePriorToCurrentPoint); some FMUs step only so. `left_at` is where an early return
+    left it so near to the end of its last step that this counts as reached [s]: its next step begins there. Infinite
+    where it got to the end.
 
     Args:
         name: of the instance.
@@ -85,7 +87,7 @@ class Slave(Instance):
         super().__init__(name, slave, description)
         self.seconds, self.calls = 0.0, 0
         self.time, self.next_event = math.nan, NEVER
-        self.no_way_back = ctypes.c_int64(1)
+        self.no_way_back, self.left_at = ctypes.c_int64(1), ctypes.c_double(math.inf)
         self._call_note: _CallNote = _Unnoted()
         self._step_number = 0
         self.usual_step, self.rounding = 1.0, 0.0
@@ -112,7 +114,7 @@ class Slave(Instance):
     def reset(self) -> None:
         """Back to the state after `instantiate`."""
         super().reset()
-        self.time, self.next_event = math.nan, NEVER
+        self.time, self.next_event, self.left_at.value = math.nan, NEVER, math.inf
 
     def note_reset(self, t: float) -> None:
         """Follow a reset that a prepared call made.
@@ -122,7 +124,7 @@ class Slave(Instance):
         """
         self._forget()
         self.terminated = self._running = False
-        self.time, self.next_event = t, NEVER
+        self.time, self.next_event, self.left_at.value = t, NEVER, math.inf
 
     def note_initialised(self) -> None:
         """Follow the end of initialisation that a prepared call made."""

@@ -328,6 +328,7 @@ Behaviour = Literal[
     "exact-steps",
     "overshoots",
     "cries",
+    "halves",
 ]
 _CODES = {
     "quit": 1,
@@ -344,7 +345,10 @@ _CODES = {
     "exact-steps": 11,
     "overshoots": 12,
     "cries": 13,
+    "halves": 14,
 }
+_EARLY = ("quit", "quit-in-event", "short", "halves")
+"""What may return early."""
 
 
 def awkward_fmu(
@@ -371,11 +375,11 @@ def awkward_fmu(
             `chatter`; ``warns``: every step returns a warning; ``fails``, ``dies``: error or fatal in the step over
             `at`; ``waits``: pending there (FMI 1.0, 2.0); ``exact-steps`` refuses a step that is no whole multiple of
             ``u``, to the last bit; ``overshoots`` says from `at` on that it stands a step beyond the end of each step,
-            ``cries`` that there is an event at `at` (FMI 3.0).
+            ``cries`` that there is an event at `at`; ``halves`` comes half of the way in every step, early (FMI 3.0).
         early: it may return early. declares_early: and says so.
     """
     event_mode = behaviour == "quit-in-event" and version == 3
-    returns_early = declares_early and version == 3 and early and behaviour in ("quit", "quit-in-event", "short")
+    returns_early = declares_early and version == 3 and early and behaviour in _EARLY
     flags = capability_flags(version, event_mode=event_mode, might_return_early=returns_early)
     if behaviour == "waits":
         flags["canRunAsynchronuously"] = "true"

@@ -26,6 +26,7 @@ ENDS = [
     ("discard", 3),
     ("discard-silently", 2),
     ("short", 3),
+    ("halves", 3),
     ("own-steps", 3),
     ("warns", 2),
     ("warns", 3),

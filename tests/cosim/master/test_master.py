@@ -18,6 +18,7 @@ from cosim.balises.telegram import Channel, FalseTelegram
 from cosim.errors import CouplingError, RunError
 from cosim.master.axis import TimeAxis
 from cosim.master.master import Master, close
+from fmus.fmi.standard import TIME_TOLERANCE
 
 # -- time and rows
 # ------------------------------------------------------------------------------------------------------
@@ -315,6 +316,24 @@ def test_a_slave_that_returns_early_is_asked_again() -> None:
     whole, parts = (run([component(s, "train")], [], 0.1, 10) for s in (Train(), Short()))
     np.testing.assert_allclose(parts["train.position"], whole["train.position"], rtol=1e-12)
     assert parts.plan.steps[0].component.calls == 40
+
+
+def test_what_an_early_return_leaves_of_a_step_is_done_in_the_next() -> None:
+    """Each call begins where the last one ended and asks for the communication point, both to the last bit."""
+    asked: list[tuple[float, float]] = []
+    reached = [0.0]
+
+    class Halving(Train):
+        def doStep(self, t: float, h: float) -> tuple[bool, bool, bool, float]:
+            asked.append((t, t + h))
+            super().doStep(t, 0.5 * h)
+            reached.append(t + 0.5 * h)
+            return False, False, True, reached[-1]
+
+    seen = run([component(Halving(), "train")], [], 2.0**-5, 200)
+    assert [t for t, _ in asked] == reached[:-1]
+    assert sorted({until for _, until in asked}) == seen["time"].tolist()[1:]  # dyadic: no sum is rounded
+    assert 0.0 < seen["time"][-1] - reached[-1] <= TIME_TOLERANCE
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@
 #define EXACT_STEPS 11 /* refuses a step that is no whole multiple of u, to the last bit */
 #define OVERSHOOTS 12 /* says from AT on that it stands beyond the end of the step */
 #define CRIES 13      /* says in the step over AT that there is an event */
+#define HALVES 14     /* comes half of the way in every step, and says so (FMI 3) */
 #define OWN_STEPS 10  /* moves in whole steps of LONGEST_STEP, and waits at the last one of them before the end of a step */
 
 typedef struct {
@@ -74,6 +75,9 @@ static Outcome model_step(Model *m, Host *host, double t, double until) {
         outcome.reached = t + LONGEST_STEP;
         outcome.early = FMI_VERSION == 3;
     }
+#elif BEHAVIOUR == HALVES
+    outcome.reached = t + 0.5 * (until - t);
+    outcome.early = true;
 #elif BEHAVIOUR == OWN_STEPS
     for (; m->moved_to + LONGEST_STEP <= until + SAME; m->moved_to = LONGEST_STEP * ++m->said)
         m->y += m->u * LONGEST_STEP;
