@@ -200,15 +200,9 @@ class CoSimulationModel(SealedModel):
     _readings: _Batch
 
     def advance(self, t: float, h: float) -> None:
-        """Go on by one communication step, inputs held.
-
-        Raises:
-            FmuModelError: the FMU refuses the step.
-        """
-        try:
-            self.instance.advance(t, t + h)
-        except SlaveError as error:
-            raise self._in_words(error) from error
+        """Go on by one communication step, inputs held; its length is handed over as it is, not ``(t + h) - t``."""
+        self.instance.expect_steps(h, t, t + h)
+        super().advance(t, h)
 
     def states_after(self, t: float, h: float, points: Array, u: Array) -> Array:  # noqa: D102 - see SealedModel
         if self._quick is None or self._quick.hangs_in:
@@ -238,6 +232,7 @@ class CoSimulationModel(SealedModel):
         """States after a step in the ordinary way from what is written before initialisation, shape (k,)."""
         first, last = len(self._settings), len(self._settings) + len(self.states)
         super()._restart(t, written[first:last], written[last:])
+        self.instance.expect_steps(h, t, t + h)
         self.instance.advance(t, t + h)
         self._read_states()
         return self._states_read

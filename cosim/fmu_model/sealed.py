@@ -169,13 +169,19 @@ class SealedModel(ABC):
         if len(self.outputs):
             self._read_outputs()
 
-    @abstractmethod
     def advance(self, t: float, h: float) -> None:
         """Go on from where the instance stands, inputs held.
 
         Args:
             t: instant [s]. h: how far [s].
+
+        Raises:
+            FmuModelError: the FMU refuses the step.
         """
+        try:
+            self.instance.advance(t, t + h)
+        except SlaveError as error:
+            raise self._in_words(error) from error
 
     def transition(self, t: float, h: float, x: Array, u: Array) -> tuple[Array, Array]:
         """States and outputs after a step from any state.

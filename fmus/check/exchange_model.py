@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -11,17 +12,29 @@ import numpy as np
 from fmpy.model_description import ModelDescription
 
 from fmus.check.checked_instance import FmuInstance
+from fmus.exchange.motion import Motion, motion_of
 from fmus.fmi.fmi2 import FMI2Instance
 from fmus.fmi.fmi3 import FMI3Instance
-from fmus.fmi.standard import MODEL_EXCHANGE, NEVER, fmi_version
+from fmus.fmi.standard import MODEL_EXCHANGE, fmi_version
+
+_TOLERANCE = 1e-10
+"""Relative, of the solver: far below what a filter or a difference shows."""
 
 
 class FmuModel(FmuInstance):
     """A model exchange instance, from `instantiate` over `initialize` to continuous-time mode."""
 
     interface = MODEL_EXCHANGE
-    next_event = NEVER
-    """The next instant at which the FMU wants Event Mode [s]."""
+
+    @cached_property
+    def motion(self) -> Motion:
+        """What moves it, from one reset to the next."""
+        return motion_of(self.slave, self.description, self.slave._functions, _TOLERANCE)
+
+    @property
+    def next_event(self) -> float:
+        """The next instant at which the FMU wants Event Mode [s]."""
+        return self.motion.next_event
 
     @property
     def state_count(self) -> int:
@@ -38,8 +51,28 @@ class FmuModel(FmuInstance):
         self.begin_initialization(start_time, start_time + 1e6)
         self.guard("exitInitializationMode", self.slave.exitInitializationMode)
         self._running = True
+        self.guard("preparing the solver", lambda: self.motion).begin()
         self.settle()
-        self.guard("enterContinuousTimeMode", self.slave.enterContinuousTimeMode)
+
+    def settle(self) -> None:
+        """From Event Mode to continuous-time mode, once the discrete states do not change any more."""
+        self.guard("event iteration", self.motion.settle)
+        self.terminated = self.motion.terminated
+
+    def enter_event_mode(self) -> None:
+        """To Event Mode, as before an input that jumps."""
+        self.guard("enterEventMode", self.motion.enter_event_mode)
+
+    def advance(self, t: float, until: float) -> None:
+        """Integrate, events on the way handled.
+
+        Args:
+            t, until: begin and end [s].
+        """
+        end = self.guard("the step", self.motion.step, t, until)
+        self.terminated = end.terminate
+        if end.terminate:
+            raise self.failure("it asks for the end of the simulation", end.time)
 
     def set_time(self, t: float) -> None:
         """Set the independent variable.
@@ -60,6 +93,7 @@ class FmuModel(FmuInstance):
             x: shape (n,).
         """
         held = np.ascontiguousarray(x, dtype=float)
+        self.motion.begin_anew()
         self.guard("setContinuousStates", lambda: self.slave.setContinuousStates(_pointer(held), len(held)))
 
     def derivatives(self) -> np.ndarray:
@@ -71,22 +105,12 @@ class FmuModel(FmuInstance):
         """Event indicators, shape (number of them,)."""
         return self._filled("getEventIndicators", self.slave.getEventIndicators, self.indicator_count)
 
-    def update_discrete_states(self) -> bool:
-        """End a super-dense instant; True where the FMU needs another one."""
-        update = self.slave.newDiscreteStates if self.fmi_version == 2 else self.slave.updateDiscreteStates
-        again, end, _, _, defined, instant = self.guard("updating discrete states", update)
-        self.terminated |= bool(end)
-        self.next_event = float(instant) if defined else NEVER
-        return bool(again)
-
-    def _forget(self) -> None:
-        self.next_event = NEVER
-
     def _remember(self) -> tuple[Any, ...]:
-        return self.terminated, self.next_event
+        return self.terminated, self.motion.state()
 
     def _recall(self, remembered: tuple[Any, ...]) -> None:
-        self.terminated, self.next_event = remembered
+        self.terminated = remembered[0]
+        self.motion.restore(remembered[1])
 
     def _filled(self, what: str, call: Callable[[Any, int], Any], count: int) -> np.ndarray:
         values = np.zeros(count)

@@ -39,7 +39,9 @@ _LIBRARIES = (
 _FOLDERS = {"x86_64-darwin": "aarch64-darwin"}
 """Where fmpy keeps the libraries of a platform under the name of another one, whose files serve both."""
 _ONE_STEP = 2
-_AT_STOP, _AT_ROOT = 1, 2
+_AT_STOP = 1
+AT_ROOT = 2
+"""What CVODE says where a root function changed its sign."""
 _START, _FINEST, _STARTED = 1e-3, 1e-12, 3
 """Below this order the tolerance is a thousandth: else each start, of order one, would err by as much as the whole run
 may, and an input that jumps at every communication point adds them up. Not below the second number.
@@ -131,6 +133,7 @@ class Cvode:
         if native is not None:
             self._take(*native)
         self._reached, self._order, self._share = ctypes.c_double(), ctypes.c_int(), 1.0
+        self._raised: Exception | None = None
         self.steps = 0
 
     def restart(self, t: float) -> None:
@@ -169,7 +172,20 @@ class Cvode:
                 self._share = 1.0
                 if self.native is not None:
                     self.native.share = 1.0
-        return (stop if flag == _AT_STOP else float(reached.value)), flag == _AT_ROOT
+        return (stop if flag == _AT_STOP else float(reached.value)), flag == AT_ROOT
+
+    def run(self, t: float, end: float) -> None:
+        """From what stands in `states` to an end, where no root function is looked at.
+
+        Args:
+            t, end: [s].
+
+        Raises:
+            SolverError: it cannot go on.
+        """
+        self.restart(t)
+        while t < end:
+            t, _ = self.step(end)
 
     def fail(self, flag: int) -> None:
         """Raise what CVODE says.
@@ -178,11 +194,20 @@ class Cvode:
             flag: below zero.
 
         Raises:
-            SolverError: always.
+            SolverError: always, unless a function raised something itself.
         """
+        raised, self._raised = self._raised, None
+        if raised is not None:
+            raise raised
         if flag not in list(_Cause):
             raise SolverError(f"CVODE returned {flag}")
         raise SolverError(WORDS[_Cause(flag)], None if flag in _UNASKED else self._worst(_Cause(flag)))
+
+    def changed_root(self) -> int:
+        """Number of the first root function that changed its sign where the last step ended."""
+        found = (ctypes.c_int * self._root_count)()
+        self._call("CVodeGetRootInfo", found)
+        return next((number for number, change in enumerate(found) if change), 0)
 
     def between(self, t: float) -> np.ndarray:
         """States at an instant within the last step [s], by the polynomial of the solver, shape (n,); valid until the
@@ -257,7 +282,11 @@ class Cvode:
         place, array = self._library.N_VGetArrayPointer, self._array
 
         def called(t: float, x: int, written: int, _data: Any) -> int:
-            return rates(t, array(place(x)), array(place(written)))
+            try:
+                return rates(t, array(place(x)), array(place(written)))
+            except Exception as error:  # nothing may pass through C
+                self._raised = error
+                return -1
 
         return called
 

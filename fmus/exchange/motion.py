@@ -9,14 +9,24 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from fmpy.model_description import ModelDescription
 
-from fmus.exchange.cvode import Cvode, SolverError
+from fmus.exchange.cvode import AT_ROOT, Cvode, SolverError
 from fmus.exchange.model_calls import EventIteration, ModelCalls
 from fmus.exchange.native_steps import EVENT, GAVE_UP, REFUSED, TERMINATE, TOO_MANY, CExchange, load_steps
-from fmus.fmi.standard import ERROR, MAX_EVENT_ITERATIONS, MAX_RETURNS_PER_STEP, NEVER, TIME_TOLERANCE, Method
+from fmus.fmi.elements import elements_of
+from fmus.fmi.standard import (
+    ERROR,
+    MAX_EVENT_ITERATIONS,
+    MAX_RETURNS_PER_STEP,
+    NEVER,
+    TIME_TOLERANCE,
+    Method,
+    fmi_version,
+)
 
 MOST_AT_ONCE = 100
 """Events each within a billionth of a second of the one before it: a model that has more does not settle."""
@@ -25,6 +35,8 @@ MOST_STEPS = 1_000_000
 """Internal steps of the solver in one communication step."""
 
 _ROUNDING = 4e-16
+MotionState = tuple[bool, bool, float]
+"""Whether it stands in Event Mode, whether the FMU asked for the end, and the next event that it knows of [s]."""
 Part = Callable[[float, float], None]
 """Called when the solver has taken an internal step, with its begin and its end [s]."""
 
@@ -63,11 +75,30 @@ class Motion:
             model.native(),
         )
         self._x = self.solver.address(self.solver.states)
-        self.in_event_mode, self.terminated, self.next_event = True, False, NEVER
-        self._anew = True
-        self._last_event, self._at_once = -NEVER, 0
         self.follower: Part | None = None
         """Called for each internal step; it may `look` at instants within it."""
+        self.begin()
+
+    def begin(self) -> None:
+        """Initialisation has just ended: it stands in Event Mode."""
+        self.in_event_mode, self.terminated, self.next_event = True, False, NEVER
+        self._last_event, self._at_once = -NEVER, 0
+        self._rooted = self._met = False
+        self.begin_anew()
+
+    def state(self) -> MotionState:
+        """What belongs to a saved state beside the FMU's own. What follows begins anew, as once it is restored."""
+        self.begin_anew()
+        return self.in_event_mode, self.terminated, self.next_event
+
+    def restore(self, state: MotionState) -> None:
+        """Return, once the FMU did.
+
+        Args:
+            state: from `state`.
+        """
+        self.in_event_mode, self.terminated, self.next_event = state
+        self.begin_anew()
 
     # -- events -----------------------------------------------------------------------------------------------------
 
@@ -116,6 +147,21 @@ class Motion:
 
     # -- time -------------------------------------------------------------------------------------------------------
 
+    def step(self, t: float, until: float) -> _StepEnd:
+        """To the end of a communication step, with all events on the way and at its end.
+
+        Args:
+            t, until: begin and end [s].
+
+        Raises:
+            FMICallException, SolverError: see `advance`.
+        """
+        end = self.advance(t, until)
+        if end.event:
+            self.enter_event_mode()
+            self.settle()
+        return end._replace(terminate=end.terminate or self.terminated)
+
     def advance(self, t: float, until: float, *, returns: bool = False) -> _StepEnd:
         """To the end of a communication step, events on the way handled; one at its end is left to the caller.
 
@@ -135,7 +181,8 @@ class Motion:
                 return end
             t = end.time
             self.enter_event_mode()
-        raise SolverError(f"at t = {t:.12g} s: {MAX_RETURNS_PER_STEP} events in one communication step")
+        most = f"{MAX_RETURNS_PER_STEP} events in one communication step"
+        raise SolverError(f"at t = {t:.12g} s: {most}, the last of them {self._event}")
 
     def _to_event(self, t: float, until: float) -> _StepEnd:
         """To the first event, which is not handled, or the end of the step.
@@ -144,7 +191,7 @@ class Motion:
             t, until: begin and end [s].
         """
         for _ in range(MOST_STEPS):
-            event, stop = False, min(until, self.next_event)
+            self._rooted, event, stop = False, False, min(until, self.next_event)
             if stop - t > _ROUNDING * max(abs(t), abs(stop)) * 2.0:
                 t, event, terminate = self._internal_steps(t, stop)
                 if terminate:
@@ -152,6 +199,7 @@ class Motion:
             elif stop > t:
                 t = stop
                 self._model.set_time(t)
+            self._met = event
             if event or self.next_event <= t + _ROUNDING * max(abs(t), 1.0):
                 self._count_event(t)
                 return _StepEnd(t, event=True, terminate=False)
@@ -177,6 +225,7 @@ class Motion:
             reached, root = solver.step(stop)
         except SolverError as error:
             raise self._explained(error, t) from error
+        self._rooted = root
         model.move(reached, self._x)
         if self.follower is not None:
             self.follower(t, reached)
@@ -191,6 +240,7 @@ class Motion:
         native.reached = t
         ended = library.exchange_steps(ctypes.addressof(native), stop, MOST_STEPS)
         self.solver.steps, native.steps = self.solver.steps + native.steps, 0
+        self._rooted = native.flag == AT_ROOT
         if ended == GAVE_UP:
             try:
                 self.solver.fail(int(native.flag))
@@ -212,6 +262,13 @@ class Motion:
         words = f"the solver (CVODE) gives up at t = {t:.12g} s: {error}{why}{worst}"
         return SolverError(words, status=ERROR if refused is None else refused.status)
 
+    @property
+    def _event(self) -> str:
+        """The last event in words."""
+        if self._rooted:
+            return f"where event indicator {self.solver.changed_root() + 1} changes its sign"
+        return "asked for after a step of the solver" if self._met else "announced by the FMU"
+
     def _count_event(self, t: float) -> None:
         close = abs(t - self._last_event) <= TIME_TOLERANCE
         self._at_once = self._at_once + 1 if close else 1
@@ -219,8 +276,35 @@ class Motion:
         if self._at_once > MOST_AT_ONCE:
             raise SolverError(
                 f"events do not settle at t = {t:.12g} s: {self._at_once} of them, each within {TIME_TOLERANCE:g} s of "
-                "the one before it (a model that chatters, or a ball that bounces faster and faster)"
+                f"the one before it, the last {self._event} (a model that chatters, or a ball that bounces faster and "
+                "faster)"
             )
+
+
+def motion_of(
+    slave: Any, description: ModelDescription, functions: dict[str, Any], tolerance: float, method: Method = "bdf"
+) -> Motion:
+    """What moves an instance of an FMU, which stands at the end of its initialisation.
+
+    Args:
+        slave: fmpy's model, instantiated. description: of the FMU.
+        functions: of the library by name, as it exports them.
+        tolerance: relative, of the solver. method: of the solver.
+    """
+    version, interface = fmi_version(description), description.modelExchange
+    unneeded = getattr(interface, "completedIntegratorStepNotNeeded", False)
+    complete = not unneeded if version < 3 else interface.needsCompletedIntegratorStep
+    counts = int(description.numberOfContinuousStates or 0), int(description.numberOfEventIndicators or 0)
+    if version == 3:
+        counts = slave.getNumberOfContinuousStates(), slave.getNumberOfEventIndicators()
+    model = ModelCalls(slave, version, counts, functions, complete_steps=complete)
+    states = [unknown.variable.derivative for unknown in description.derivatives]
+    names = [element.name for state in states if state is not None for element in elements_of(state)]
+
+    def name(number: int) -> str:
+        return f"state '{names[number]}'" if number < len(names) else f"state {number + 1}"
+
+    return Motion(model, tolerance, method, name)
 
 
 def _too_many(t: float) -> SolverError:

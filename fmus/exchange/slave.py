@@ -21,9 +21,8 @@ from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 from fmpy.model_description import ModelDescription
 
 from fmus.exchange.cvode import SolverError
-from fmus.exchange.model_calls import EventIteration, ModelCalls
-from fmus.exchange.motion import Motion, Part
-from fmus.fmi.elements import elements_of
+from fmus.exchange.model_calls import EventIteration
+from fmus.exchange.motion import Motion, MotionState, Part, motion_of
 from fmus.fmi.standard import DISCARD, ERROR, NEVER, OK, TIME_TOLERANCE, WARNING, Method, fmi_version
 from fmus.fmi.types import BOOLEANS, CTYPES
 
@@ -44,9 +43,7 @@ class _Saved:
 
     held: ctypes.c_void_p
     sent: dict[tuple[str, bytes], bytes]
-    in_event_mode: bool
-    terminated: bool
-    next_event: float
+    motion: MotionState
 
 
 class CoSimulationFunctions:
@@ -144,23 +141,8 @@ class CoSimulationFunctions:
             self._motion.leave_event_mode()
 
     def _begin(self) -> None:
-        interface = self._description.modelExchange
-        declared = getattr(interface, "completedIntegratorStepNotNeeded", False)
-        complete = not declared if self._version < 3 else interface.needsCompletedIntegratorStep
-        model = ModelCalls(self._slave, self._version, self._counts(), self._functions, complete_steps=complete)
-        self.motion, self.reached = Motion(model, self.tolerance, self._method, self._state_name), self._start
-
-    def _counts(self) -> tuple[int, int]:
-        description = self._description
-        if self._version == 3:
-            return self._slave.getNumberOfContinuousStates(), self._slave.getNumberOfEventIndicators()
-        return int(description.numberOfContinuousStates or 0), int(description.numberOfEventIndicators or 0)
-
-    def _state_name(self, number: int) -> str:
-        rates = [unknown.variable for unknown in self._description.derivatives]
-        of = [v.derivative for v in rates if v.derivative is not None]
-        names = [element.name for variable in of for element in elements_of(variable)]
-        return f"state '{names[number]}'" if number < len(names) else f"state {number + 1}"
+        self.motion = motion_of(self._slave, self._description, self._functions, self.tolerance, self._method)
+        self.reached = self._start
 
     @property
     def _motion(self) -> Motion:
@@ -173,11 +155,7 @@ class CoSimulationFunctions:
     def _step(self, _call: Any, _instance: Any, t: float, h: float, _past: Any, *results: int) -> int:
         if self._version == 3:
             return self._step_to_event(t, t + h, *results)
-        end = self._motion.advance(t, t + h)
-        if end.event:
-            self._motion.enter_event_mode()
-            self._motion.settle()
-            end = end._replace(terminate=self._motion.terminated)
+        end = self._motion.step(t, t + h)
         self.reached = end.time
         return DISCARD if end.terminate else OK
 
@@ -248,22 +226,15 @@ class CoSimulationFunctions:
         status = call(instance, ctypes.addressof(held))
         if status <= WARNING:
             number = next(self._numbers)
-            state = motion.in_event_mode, motion.terminated, motion.next_event
-            self._saved[number] = _Saved(held, dict(self._sent), *state)
+            self._saved[number] = _Saved(held, dict(self._sent), motion.state())
             ctypes.c_void_p.from_address(place).value = number
-            motion.begin_anew()
         return status
 
     def _restore(self, call: Callable[..., int], instance: Any, number: int) -> int:
         saved, motion = self._saved[number], self._motion
         status = call(instance, saved.held.value)
         self._sent = dict(saved.sent)
-        motion.in_event_mode, motion.terminated, motion.next_event = (
-            saved.in_event_mode,
-            saved.terminated,
-            saved.next_event,
-        )
-        motion.begin_anew()
+        motion.restore(saved.motion)
         return status
 
     def _release(self, call: Callable[..., int], instance: Any, place: int) -> int:

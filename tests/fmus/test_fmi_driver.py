@@ -25,8 +25,8 @@ from fmus.fmi.native_calls import prepared_call
 
 CHECKED = (FmuInstance, FmuSlave2, FmuSlave3, FmuModel, FmuModel2, FmuModel3)
 STEPPED = (DescribedComponent, Component, FMI1Component, FMI2Component, FMI3Component)
-OWN_WORDS = {"failure", "note", "_forget"}
-"""How an error reads, where messages go and what of a run is remembered is for each side to say."""
+OWN_WORDS = {"failure", "note"}
+"""How an error reads and where messages go is for each side to say."""
 
 
 def own_methods(classes: tuple[type, ...]) -> set[str]:
