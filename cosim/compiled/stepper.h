@@ -87,7 +87,7 @@ enum { BEYOND_STEP, EARLY_RETURN, EVENT_WITHOUT_MODE, CONTRADICTIONS };
 typedef struct {
     void *instance;
     void *do_step;
-    int64_t *no_way_back;              /* nothing was saved so far: no step leads back before the begin of this one */
+    int *no_way_back;                  /* nothing was saved so far: no step leads back before the begin of this one */
     double *left_at;                   /* FMI 3: where an early return just before its end left the last step [s], else infinite */
     Port *writes, *reads;
     int64_t write_count, read_count;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Mapping
 from typing import Any
 
@@ -58,7 +57,7 @@ class FMI2Slave(FMI2Instance, WholeStepSlave):
     def _instantiate(self) -> None:
         super()._instantiate()
         self._last = () if is_native(self.slave) else (bool(self.no_way_back.value),)
-        self._do_step = make_step(self.slave, "fmi2DoStep", ctypes.c_int(), self.no_way_back)
+        self._do_step = make_step(self.slave, "fmi2DoStep", self.no_way_back)
         if is_native(self.slave):
             quicken(self.slave, self.fmi_version, (self._get_state, self._set_state, self._free_state))
         self._forget()

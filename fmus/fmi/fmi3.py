@@ -298,7 +298,7 @@ class FMI3Slave(FMI3Instance, Slave):
         return {"eventModeUsed": self.has_event_mode, "earlyReturnAllowed": early} | self._intermediate.arguments
 
 
-def _native_step(slave: Any, no_way_back: ctypes.c_int64) -> Callable[[float, float], tuple[bool, bool, bool, float]]:
+def _native_step(slave: Any, no_way_back: ctypes.c_int) -> Callable[[float, float], tuple[bool, bool, bool, float]]:
     """fmpy's doStep of a native slave with its four results allocated once instead of at every call."""
     event, terminate, early, reached = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
     results = (ctypes.byref(event), ctypes.byref(terminate), ctypes.byref(early), ctypes.byref(reached))

@@ -87,7 +87,7 @@ class Slave(Instance):
         super().__init__(name, slave, description)
         self.seconds, self.calls = 0.0, 0
         self.time, self.next_event = math.nan, NEVER
-        self.no_way_back, self.left_at = ctypes.c_int64(1), ctypes.c_double(math.inf)
+        self.no_way_back, self.left_at = ctypes.c_int(1), ctypes.c_double(math.inf)
         self._call_note: _CallNote = _Unnoted()
         self._step_number = 0
         self.usual_step, self.rounding = 1.0, 0.0
@@ -108,6 +108,8 @@ class Slave(Instance):
         that, this multiple.
         """
         length = until - t
+        if abs(length - self.usual_step) <= self.rounding:
+            return self.usual_step
         whole = round(length / self.usual_step) * self.usual_step
         return whole if abs(length - whole) <= self.rounding else length
 
@@ -254,13 +256,13 @@ def status_of(ask: Callable[[int], Any], kind: int) -> Any:
         return None
 
 
-def make_step(slave: Any, name: str, flag: Any, no_way_back: ctypes.c_int64 | None = None) -> Callable[..., None]:
+def make_step(slave: Any, name: str, flag: Any) -> Callable[..., None]:
     """The doStep of FMI 1 and 2 from a time by a length, both in [s], its arguments allocated once.
 
     Args:
         slave: instantiated, with fmpy's call surface.
         name: of the function in fmpy's words.
-        flag: the last argument as C has it. no_way_back: what it follows, if anything.
+        flag: the last argument as C has it, read at each call.
     """
     if not is_native(slave):
         step: Callable[..., None] = slave.doStep
@@ -270,8 +272,6 @@ def make_step(slave: Any, name: str, flag: Any, no_way_back: ctypes.c_int64 | No
 
     def do_step(t: float, h: float) -> None:
         start.value, length.value = t, h
-        if no_way_back is not None:
-            flag.value = no_way_back.value != 0
         call()
 
     return do_step
