@@ -15,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
-from cosim.comparison.span import with_unit
 from cosim.comparison.verdict import SPAN, ComparisonData, Curves, SignalComparison
+from cosim.results.shown_unit import shared_unit
 
 Kind = Literal["factor", "delay", "offset"]
 KINDS: tuple[Kind, ...] = ("factor", "delay", "offset")
@@ -211,15 +211,17 @@ def _text(fit: _Fit, names: Sequence[str], comparison: ComparisonData) -> str:
         who = names[0]
     shown = "" if not several or len(names) == len(compared) else f": {', '.join(names[:_NAMED])}"
     more = f" and {len(names) - _NAMED} more" if shown and len(names) > _NAMED else ""
-    return f"{who} {_verb(fit, several, comparison)}{shown}{more}"
+    return f"{who} {_verb(fit, names, comparison)}{shown}{more}"
 
 
-def _verb(fit: _Fit, several: bool, comparison: ComparisonData) -> str:
-    amount = abs(fit.value)
+def _verb(fit: _Fit, names: Sequence[str], comparison: ComparisonData) -> str:
+    amount, several = abs(fit.value), len(names) > 1
     if fit.kind == "delay":
         return f"{'are' if several else 'is'} {_delay_text(fit)}{_in_steps(amount, comparison)}"
     if fit.kind == "offset":
-        return f"{'are' if several else 'is'} {with_unit(amount, fit.unit)} too {'high' if fit.value > 0.0 else 'low'}"
+        unit = shared_unit(s.shown for s in comparison.failed if s.name in names)
+        high = "high" if fit.value > 0.0 else "low"
+        return f"{'are' if several else 'is'} {unit.difference_text(amount)} too {high}"
     if isclose(fit.value, -1.0, rel_tol=1e-3):
         return f"{'have' if several else 'has'} the opposite sign"
     if amount < 1e-3:

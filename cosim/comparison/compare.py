@@ -329,18 +329,20 @@ class _Pair:
         held = "discrete" in (one.variability, two.variability) or all(map(is_held, values))
         reference, result = (Curve(time, v, held) for time, v in zip(self.times, values, strict=True))
         tolerance, allowed = self.tolerances.for_signal(name), self.tolerances.value_for(name, reference)
-        return compare_signal(Task(name, one.unit, reference, result, tolerance, allowed, self.length, self.curves))
+        shown = two.shown if self.bare[0] else one.shown
+        return compare_signal(Task(name, shown, reference, result, tolerance, allowed, self.length, self.curves))
 
     def lone(self, name: str, status: Literal["missing", "extra"]) -> SignalComparison:
         """The entry of a signal that only one side has, or that is ignored."""
         info = self.infos[0 if status == "missing" else 1].get(name, SignalInfo(name))
         tolerance = self.tolerances.for_signal(name)
         if self.tolerances.ignores(name):
-            return SignalComparison(name, info.unit, "ignored", tolerance)
+            return SignalComparison(name, info.unit, "ignored", tolerance, shown_in=info.shown)
         near = [*_nearest(name, self.extra), *_nearest(name, self.has)] if status == "missing" else []
         equal = self._equal_values(name) if status == "missing" else ""
+        near = list(dict.fromkeys(near))[:3]
         return SignalComparison(
-            name, info.unit, status, tolerance, nearest=list(dict.fromkeys(near))[:3], equal_values=equal
+            name, info.unit, status, tolerance, nearest=near, equal_values=equal, shown_in=info.shown
         )
 
     def _equal_values(self, name: str) -> str:

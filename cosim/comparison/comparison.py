@@ -17,9 +17,9 @@ class Comparison(ComparisonData, Readable):
     def _picture_html(self) -> str:
         """Both sides and the error of the signal that differs most, or else of the first; the tolerance around them."""
         shown = next((s for s in (*self.failed, *self.signals) if s.curves is not None), None)
-        if shown is None or (curves := shown.curves) is None:
+        if shown is None or (curves := shown.as_shown().curves) is None:
             return ""
-        unit = f" [{shown.unit}]" if shown.unit not in ("", "1") else ""
+        unit = f" [{shown.shown.name}]" if shown.shown.name not in ("", "1") else ""
         tube = [Line("tolerance", curves.tube_time, edge, "allowed") for edge in (curves.lower, curves.upper)]
         reference = Line(self.reference, curves.reference_time, curves.reference, "true")
         both = [*tube[:1], replace(tube[1], label=""), reference, Line(self.result, curves.result_time, curves.result)]

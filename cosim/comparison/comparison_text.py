@@ -187,7 +187,12 @@ def signals_table(signals: Sequence[SignalComparison], failed: Sequence[SignalCo
     Args:
         signals: in the order in which they are shown. failed: of them, those that stand out on a page.
     """
-    return Table("signals", _COLUMNS, [_row(signal) for signal in signals], bad={_verdict(signal) for signal in failed})
+    return Table(
+        "signals",
+        _COLUMNS,
+        [_row(signal.as_shown()) for signal in signals],
+        bad={_verdict(signal) for signal in failed},
+    )
 
 
 def _row(signal: SignalComparison) -> list[Any]:
@@ -212,7 +217,7 @@ def _findings(signal: SignalComparison, shared: Mapping[str, int]) -> list[str]:
 
 def _points(signal: SignalComparison, shared: Mapping[str, int]) -> Table | str:
     """The worst points of a signal whose values differ."""
-    points = signal.worst if any(finding.kind == "value" for finding in _own(signal, shared)) else ()
+    points = signal.as_shown().worst if any(finding.kind == "value" for finding in _own(signal, shared)) else ()
     title = f"worst points of {signal.name}"
     return Table(title, _POINT_COLUMNS, points, title=f"  {title}:") if points else ""
 

@@ -9,10 +9,11 @@ import numpy as np
 from cosim.comparison.curve import Curve
 from cosim.comparison.jumps import Jumps
 from cosim.comparison.points import Allowed, MatchedJumps, Points, compare_points, outside_between
-from cosim.comparison.span import rounding, row_findings, runs, when, with_unit
+from cosim.comparison.span import rounding, row_findings, runs, when
 from cosim.comparison.tolerance import Tolerance
 from cosim.comparison.tube import band_of
 from cosim.comparison.verdict import ComparisonFinding, Curves, Kind, SignalComparison
+from cosim.results.shown_unit import ShownUnit
 
 _FEW_ROWS = 0.01
 """Share of the rows, on either hand, that are few."""
@@ -25,7 +26,7 @@ WORST = 5  # points that are kept
 _WINDOW_STEPS, _WINDOW_SHARE, _WINDOW_TOLERANCES = 20.0, 0.01, 10.0  # how far off a jump is looked for
 
 
-def _value_findings(name: str, unit: str, points: Points, allowed: Allowed) -> list[ComparisonFinding]:
+def _value_findings(name: str, unit: ShownUnit, points: Points, allowed: Allowed) -> list[ComparisonFinding]:
     """Runs of points outside the tube, each with its worst point."""
     rows = np.flatnonzero(points.evaluated)
     size = np.abs(points.error[rows])
@@ -51,7 +52,7 @@ def _number_findings(name: str, points: Points) -> list[ComparisonFinding]:
 
 
 def _jump_findings(
-    name: str, unit: str, points: Points, jumps: MatchedJumps, allowed: Allowed
+    name: str, unit: ShownUnit, points: Points, jumps: MatchedJumps, allowed: Allowed
 ) -> list[ComparisonFinding]:
     """Jumps that are early or late, and jumps that one side has alone and that the values confirm."""
     found = _shift_findings(name, unit, jumps, allowed)
@@ -61,12 +62,12 @@ def _jump_findings(
 
 
 def _value_finding(
-    name: str, unit: str, points: Points, ends: tuple[int, int], worst: int, count: int, allowed: Allowed
+    name: str, unit: ShownUnit, points: Points, ends: tuple[int, int], worst: int, count: int, allowed: Allowed
 ) -> ComparisonFinding:
     begin, end, at = (float(points.time[row]) for row in (*ends, worst))
     error = float(points.error[worst])
-    side = f"{with_unit(abs(error), unit)} too {'high' if error > 0.0 else 'low'}"
-    limit = f"(allowed {with_unit(allowed.value, unit)})"
+    side = f"{unit.difference_text(abs(error))} too {'high' if error > 0.0 else 'low'}"
+    limit = f"(allowed {unit.difference_text(allowed.value)})"
     where = f"outside the tube, {side} {limit}"
     if ends[1] > ends[0]:
         where = f"{count} points outside the tube, at worst {side} at {at:.9g} s {limit}"
@@ -84,7 +85,7 @@ def _value_finding(
     )
 
 
-def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed) -> list[ComparisonFinding]:
+def _shift_findings(name: str, unit: ShownUnit, jumps: MatchedJumps, allowed: Allowed) -> list[ComparisonFinding]:
     size = np.abs(jumps.shift)
     slack = rounding(*jumps.reference.end[-1:], *jumps.reference.begin[:1], 0.0)
     found = []
@@ -92,7 +93,7 @@ def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed)
         worst = a + int(np.argmax(size[a:b]))
         one, two = float(jumps.reference.end[worst]), float(jumps.result.end[worst])
         late = "late" if jumps.shift[worst] > 0.0 else "early"
-        height = with_unit(abs(float(jumps.reference.size[worst])), unit)
+        height = unit.difference_text(abs(float(jumps.reference.size[worst])))
         amount = f"{size[worst]:.4g} s {late} (allowed {allowed.time:.4g} s)"
         text = f"{name}: the jump of {height} at {one:.9g} s comes {amount}"
         if b - a > 1:
@@ -107,7 +108,7 @@ def _shift_findings(name: str, unit: str, jumps: MatchedJumps, allowed: Allowed)
 
 
 def _lone_findings(
-    name: str, unit: str, kind: Kind, jumps: Jumps, points: Points, allowed: Allowed
+    name: str, unit: ShownUnit, kind: Kind, jumps: Jumps, points: Points, allowed: Allowed
 ) -> list[ComparisonFinding]:
     if not len(jumps):
         return []
@@ -121,7 +122,7 @@ def _lone_findings(
         worst = a + int(np.argmax(size))
         before, after = float(jumps.before[worst]), float(jumps.after[worst])
         whose = "missing" if kind == "jump_missing" else "only in the result"
-        step = f"from {with_unit(before, unit)} to {with_unit(after, unit)} at {float(jumps.end[worst]):.9g} s"
+        step = f"from {unit.text(before)} to {unit.text(after)} at {float(jumps.end[worst]):.9g} s"
         text = f"{name}: the jump {step} is {whose}"
         if b - a > 1:
             span = when(float(jumps.end[a]), float(jumps.end[b - 1]))
@@ -146,13 +147,13 @@ class Task:
     """What is to be compared.
 
     Args:
-        name: of the signal. unit: of both curves. reference, result: the curves. tolerance: for this signal.
-        allowed: difference in value that it allows [unit]. length: of the reference [s].
+        name: of the signal. unit: in which it is shown; the curves are kept in the one of SI. reference, result: the
+        curves. tolerance: for this signal. allowed: difference in value that it allows. length: of the reference [s].
         curves: whether to keep what pictures need.
     """
 
     name: str
-    unit: str
+    unit: ShownUnit
     reference: Curve
     result: Curve
     tolerance: Tolerance
@@ -177,7 +178,7 @@ def compare_signal(task: Task) -> SignalComparison:
     at = int(evaluated[np.argmax(size)]) if len(evaluated) else None
     return SignalComparison(
         task.name,
-        task.unit,
+        task.unit.kept,
         "differs" if findings else "within",
         task.tolerance,
         allowed.value,
@@ -192,6 +193,7 @@ def compare_signal(task: Task) -> SignalComparison:
         curves=_curves(task, points, jumps, allowed) if task.curves else None,
         scale=allowed.scale,
         remark="" if findings else _without_numbers(task) or _remark(task, points, allowed),
+        shown_in=task.unit,
     )
 
 
@@ -220,7 +222,7 @@ def _remark(task: Task, points: Points, allowed: Allowed) -> str:
         return ""
     far = int(np.count_nonzero((values < low - share) | (values > high + share)))
     rows = far or len(values) - len(usual)
-    scale, rest, size, limit = (with_unit(v, task.unit) for v in (allowed.scale, share, error, allowed.value))
+    scale, rest, size, limit = map(task.unit.difference_text, (allowed.scale, share, error, allowed.value))
     return (
         f"{task.name}: {rows} of {len(values)} rows set its range of {scale}; the others have one of {rest} and differ "
         f"by up to {size}, which passes (allowed {limit}): state a tolerance for it."
@@ -252,7 +254,7 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
         curves = Curves(time, values, time, values, time, low, high, time, error, allowed.value, reference.held)
     return SignalComparison(
         task.name,
-        task.unit,
+        task.unit.kept,
         "equal",
         task.tolerance,
         allowed.value,
@@ -263,6 +265,7 @@ def _equal(task: Task, allowed: Allowed) -> SignalComparison:
         curves=curves,
         scale=allowed.scale,
         remark=_without_numbers(task),
+        shown_in=task.unit,
     )
 
 

@@ -11,6 +11,7 @@ from cosim.comparison.jumps import NEIGHBOURS
 from cosim.comparison.points import Allowed
 from cosim.comparison.tube import band_of
 from cosim.comparison.verdict import ComparisonFinding, Kind
+from cosim.results.shown_unit import ShownUnit
 
 _MOST_RUNS = (
     20  # runs of points outside the tube that are reported one by one; more of them are joined over the gaps between
@@ -24,16 +25,6 @@ def rounding(*times: float) -> float:
         times: instants [s].
     """
     return 8.0 * float(np.finfo(float).eps) * max(abs(time) for time in times)
-
-
-def with_unit(value: float, unit: str) -> str:
-    """A number as people read it; pure numbers without a unit.
-
-    Args:
-        value: in this unit.
-        unit: ``1`` for pure numbers.
-    """
-    return f"{value:.4g}" if unit in ("", "1") else f"{value:.4g} {unit}"
 
 
 def runs(marked: np.ndarray) -> list[tuple[int, int]]:
@@ -60,11 +51,14 @@ def when(begin: float, end: float) -> str:
     return f"at {begin:.9g} s" if begin == end else f"from {begin:.9g} to {end:.9g} s"
 
 
-def row_findings(name: str, unit: str, reference: Curve, result: Curve, allowed: Allowed) -> list[ComparisonFinding]:
+def row_findings(
+    name: str, unit: ShownUnit, reference: Curve, result: Curve, allowed: Allowed
+) -> list[ComparisonFinding]:
     """Other begins and ends, gaps, and what the reference does between two rows of the result.
 
     Args:
-        name, unit: of the signal. reference, result: the curves. allowed: difference that is allowed.
+        name: of the signal. unit: in which it is shown. reference, result: the curves.
+        allowed: difference that is allowed.
     """
     found = _span_findings(name, reference, result, allowed.time)
     gaps = _gap_findings(name, reference, result, allowed.value, allowed.time)
@@ -126,12 +120,13 @@ def _gap_findings(
 
 
 def _unseen_findings(
-    name: str, unit: str, sides: tuple[Curve, Curve], allowed: Allowed, known: list[ComparisonFinding]
+    name: str, unit: ShownUnit, sides: tuple[Curve, Curve], allowed: Allowed, known: list[ComparisonFinding]
 ) -> list[ComparisonFinding]:
     """Where the reference moves between two rows of the result, beyond the gaps that are known.
 
     Args:
-        name, unit: of the signal. sides: reference and result. allowed: difference that is allowed. known: the gaps.
+        name: of the signal. unit: in which it is shown. sides: reference and result.
+        allowed: difference that is allowed. known: the gaps.
     """
     reference = sides[0]
     off = _unseen(*sides, allowed.time)
@@ -141,7 +136,7 @@ def _unseen_findings(
     for a, b in runs(off > allowed.value):
         worst = a + int(np.argmax(off[a:b]))
         begin, end, at = (float(reference.time[row]) for row in (a, b - 1, worst))
-        size, limit = (with_unit(value, unit) for value in (float(off[worst]), allowed.value))
+        size, limit = map(unit.difference_text, (float(off[worst]), allowed.value))
         amount = f"by {size}" if begin == end else f"at worst by {size} at {at:.9g} s"
         what = f"the reference moves between two rows of the result, {amount} (allowed {limit})"
         text = f"{name}: {when(begin, end)} {what}; too few rows to be compared"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from cosim.comparison.tolerance import Tolerance
 from cosim.results.result import BaliseRecord, PacketRecord
+from cosim.results.shown_unit import ShownUnit
 
 Record = BaliseRecord | PacketRecord
 
@@ -84,6 +85,22 @@ class Curves:
     allowed: float
     held: bool = False
 
+    def as_shown(self, unit: ShownUnit) -> Curves:
+        """The same in a unit.
+
+        Args:
+            unit: in which it is shown.
+        """
+        return replace(
+            self,
+            reference=unit.values(self.reference),
+            result=unit.values(self.result),
+            lower=unit.values(self.lower),
+            upper=unit.values(self.upper),
+            error=self.error / unit.factor,
+            allowed=unit.difference(self.allowed),
+        )
+
 
 @dataclass(frozen=True)
 class SignalComparison:
@@ -105,6 +122,7 @@ class SignalComparison:
         same_values: for a missing signal, the name of one that only the result has, with its values.
         scale: range of the reference, of which a relative tolerance is a share [unit].
         remark: what to know of a signal that passed, a line for people; empty where there is nothing.
+        shown_in: unit in which texts, pages and pictures show it; None for `unit`.
     """
 
     name: str
@@ -125,6 +143,30 @@ class SignalComparison:
     equal_values: str = ""
     scale: float = float("nan")
     remark: str = ""
+    shown_in: ShownUnit | None = None
+
+    @property
+    def shown(self) -> ShownUnit:
+        """The unit in which texts, pages and pictures show it."""
+        return self.shown_in or ShownUnit(self.unit, kept=self.unit)
+
+    def as_shown(self) -> SignalComparison:
+        """The same with all numbers in the unit in which it is shown, for texts and pictures."""
+        unit, size = self.shown, self.shown.difference
+        if unit.is_kept:
+            return self
+        worst = [(t, unit.value(one), unit.value(two), size(error)) for t, one, two, error in self.worst]
+        return replace(
+            self,
+            unit=unit.name,
+            allowed=size(self.allowed),
+            max_error=size(self.max_error),
+            rms_error=size(self.rms_error),
+            worst=worst,
+            curves=None if self.curves is None else self.curves.as_shown(unit),
+            scale=size(self.scale),
+            shown_in=None,
+        )
 
     @property
     def share_of_range(self) -> float:

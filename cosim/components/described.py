@@ -157,6 +157,14 @@ class DescribedComponent(fmi.Described):
         """
         return self._units.named(self.variables[name])
 
+    def displayed_unit(self, name: str) -> NamedUnit | None:
+        """The display unit of a variable, see `Units.displayed`.
+
+        Args:
+            name: variable, or element of an array.
+        """
+        return self._units.displayed(self.variables[name])
+
     def unit(self, name: str) -> Unit | None:
         """The unit of a variable from the FMU's own unit definitions, or None where it declares none.
 

@@ -22,6 +22,7 @@ from cosim.coupling.non_numeric import Cells, Node, non_numeric_inputs
 from cosim.coupling.planned import PlannedComponent, PlannedInterpolator
 from cosim.errors import CouplingError, nearest
 from cosim.results.result import SignalInfo
+from cosim.results.shown_unit import own_scale
 from fmus.fmi.types import NUMERIC_TYPES
 
 
@@ -217,17 +218,17 @@ def _names_to_read(component: Component, extra: Sequence[str], sources: Sequence
 
 def _info(component: Component, name: str) -> SignalInfo:
     variable = component.variables[name]
-    declared = variable.declaredType
-    display = variable.displayUnit or (declared.displayUnit if declared is not None else None)
+    display = component.displayed_unit(name)
     flows = variable.type in FLOATING_TYPES and variable.variability in (None, "continuous")
     unit = component.unit_name(name) or "1"
     return SignalInfo(
         f"{component.name}.{name}",
         unit,
-        display,
+        None if display is None else display.name,
         "continuous" if flows else "discrete",
         variable.description or "",
         component.can_be_missing(name),
+        display_scale=None if display is None or display.unit is None else own_scale(display.name, display.unit),
     )
 
 

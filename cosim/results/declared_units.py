@@ -58,7 +58,7 @@ def in_si_only(signals: Sequence[SignalInfo]) -> list[SignalInfo]:
     Args:
         signals: what the columns are.
     """
-    return [replace(signal, declared_unit=None) for signal in signals]
+    return [replace(signal, declared_unit=None, display_unit=None, display_scale=None) for signal in signals]
 
 
 def meant_unit(name: str) -> Unit | None:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cosim.diagnostics.messages import Message
 from cosim.errors import nearest
+from cosim.results.shown_unit import ShownUnit, shown_unit
 from fmus.tables.table import SCREEN_ROWS, Column, FirstScreen, Parts, Table, name_column, text_column
 
 
@@ -20,11 +21,13 @@ class SignalInfo:
     Args:
         name: ``component.signal``.
         unit: SI unit, ``1`` for a pure number.
-        display_unit: unit to show to people, or None for `unit`.
+        display_unit: unit in which its FMU wants it shown to people; None where it wants none.
         variability: ``continuous`` or ``discrete`` (held between its changes).
         description: one line.
         can_be_missing: whether NaN says that there is no value.
-        declared_unit: unit in which its FMU counts, in which text tables show it; None for `unit`.
+        declared_unit: unit in which its FMU counts, in which files hold it; None for `unit`.
+        display_scale: factor and offset of the display unit, ``value = factor * shown + offset``, where only the FMU
+            says what its name means; None where everybody understands it.
     """
 
     name: str
@@ -34,6 +37,12 @@ class SignalInfo:
     description: str = ""
     can_be_missing: bool = False
     declared_unit: str | None = None
+    display_scale: tuple[float, float] | None = None
+
+    @property
+    def shown(self) -> ShownUnit:
+        """The unit in which pages, tables and pictures show it: the display unit, else the declared one, else SI."""
+        return shown_unit(self.unit, (self.display_unit, self.declared_unit), self.display_scale)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,15 +174,16 @@ class ResultData(FirstScreen, Mapping[str, np.ndarray]):
         return [sentence if self.failure is None else f"{sentence} Ended early: {self.failure}", self.signals_table()]
 
     def signals_table(self) -> Table:
-        """The first signals, with their ends and extremes in SI units."""
+        """The first signals, with their ends and extremes in the units in which they are shown."""
         names, rows = list(self)[1:], []
-        units = {signal.name: signal.unit for signal in self.signals}
+        units = {signal.name: signal.shown for signal in self.signals}
         for name in names[:SCREEN_ROWS]:
-            values = np.asarray(self[name], dtype=float)
+            unit = units.get(name, ShownUnit())
+            values = unit.values(np.asarray(self[name], dtype=float))
             known = values[~np.isnan(values)]
             ends = [float(values[0]), float(values[-1])] if len(values) else [None, None]
             extremes = [float(known.min()), float(known.max())] if len(known) else [None, None]
-            rows.append([name, units.get(name, "1"), *ends, *extremes])
+            rows.append([name, unit.name, *ends, *extremes])
         more = len(names) - len(rows)
         return Table("signals", _COLUMNS, rows, notes=[f"... and {more} more signals"] if more else [])
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from cosim.results.result_data import SignalInfo
+from cosim.results.shown_unit import own_scale
 from plant_models.hybrid.units import BASE_SYMBOLS, Unit, UnitError, parse_unit
 
 NAMED = {
@@ -129,8 +130,10 @@ def _described(signal: SignalInfo, unit: Unit | None) -> SignalInfo:
         return signal
     names = [name for name in (signal.unit, signal.display_unit) if name is not None]
     declared = next((name for name in names if _is_called(unit, name)), None)
-    display = signal.display_unit or signal.unit
-    return replace(signal, unit=_si_name(unit), display_unit=display, declared_unit=declared)
+    found = replace(signal, unit=_si_name(unit), declared_unit=declared)
+    if signal.display_unit:
+        return found
+    return replace(found, display_unit=signal.unit, display_scale=own_scale(signal.unit, unit))
 
 
 def _is_called(unit: Unit, name: str) -> bool:

@@ -29,8 +29,8 @@ def to_pandas(result: ResultData, signals: Iterable[str] | None = None) -> Any:
         result: the result. signals: names of those wanted, in the order wanted; all by default.
 
     Returns:
-        `pandas.DataFrame`; ``attrs`` holds ``units``, ``display_units`` and ``descriptions`` by column, and
-        ``failure``.
+        `pandas.DataFrame`; ``attrs`` holds ``units`` (of the numbers), ``declared_units``, ``display_units`` and
+        ``descriptions`` by column, and ``failure``.
 
     Raises:
         KeyError: a signal was not recorded. OutputError: pandas is not installed.
@@ -43,6 +43,7 @@ def to_pandas(result: ResultData, signals: Iterable[str] | None = None) -> Any:
         values[:, place] = result[name]
     frame = pandas.DataFrame(values, index=pandas.Index(np.array(result.time), name="time"), columns=names, copy=False)
     frame.attrs["units"] = {s.name: s.unit for s in chosen}
+    frame.attrs["declared_units"] = {s.name: s.declared_unit for s in chosen if s.declared_unit is not None}
     frame.attrs["display_units"] = {s.name: s.display_unit for s in chosen if s.display_unit is not None}
     frame.attrs["descriptions"] = {s.name: s.description for s in chosen}
     frame.attrs["failure"] = result.failure
@@ -88,8 +89,8 @@ def to_xarray(result: ResultData, signals: Iterable[str] | None = None) -> Any:
 
     Returns:
         `xarray.Dataset`: a variable each for the signals, with the attributes ``units`` (as the CF conventions call
-        it), ``long_name``, ``variability`` and, where there is one, ``display_unit``; the columns of the telegrams as
-        ``balise_stamp``, ``balise_position``, ...; ``failure`` as an attribute of the set.
+        it), ``long_name``, ``variability`` and, where there are such, ``declared_unit`` and ``display_unit``; the
+        columns of the telegrams as ``balise_stamp``, ``balise_position``, ...; ``failure`` as an attribute of the set.
 
     Raises:
         KeyError: a signal was not recorded. OutputError: xarray is not installed.
@@ -109,4 +110,5 @@ def to_xarray(result: ResultData, signals: Iterable[str] | None = None) -> Any:
 def _attributes(signal: SignalInfo) -> dict[str, str]:
     known = {"units": signal.unit, "variability": signal.variability}
     known |= {"long_name": signal.description} if signal.description else {}
-    return known | ({} if signal.display_unit is None else {"display_unit": signal.display_unit})
+    more = {"declared_unit": signal.declared_unit, "display_unit": signal.display_unit}
+    return known | {name: unit for name, unit in more.items() if unit is not None}

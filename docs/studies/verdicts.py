@@ -18,9 +18,9 @@ from repetitions import Repetition
 from cosim import Result
 from cosim.baselines import Baseline, check, read_baseline, write_baseline
 from cosim.comparison.comparison import Comparison
-from cosim.comparison.span import with_unit
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.comparison.verdict import SignalComparison
+from cosim.results.shown_unit import ShownUnit
 
 DEFAULT = Tolerance().relative
 RELATIVE = (1e-3, DEFAULT, 1e-6)
@@ -147,4 +147,4 @@ def _size(signal: SignalComparison) -> str:
         return f"{worst.size:.0f} point"
     unit = "s" if worst.kind not in ("value", "jump_missing", "jump_extra") else signal.unit
     ratio = f", {worst.size / worst.allowed:.2g} × allowed" if worst.allowed > 0.0 else ""
-    return f"{with_unit(float(f'{worst.size:.3g}'), unit)}{ratio}"
+    return f"{ShownUnit(unit).text(float(f'{worst.size:.3g}'))}{ratio}"

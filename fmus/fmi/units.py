@@ -110,6 +110,28 @@ class Units:
         except UnitError:
             return NamedUnit(str(name), None)
 
+    def displayed(self, variable: ModelVariable) -> NamedUnit | None:
+        """The display unit of a variable with its name and what it is in SI; None where it declares none, or nothing
+        says what it is. Where everybody understands the name, that is what it means.
+        """
+        declared, own = variable.declaredType, self.named(variable)
+        name = variable.displayUnit or (declared.displayUnit if declared is not None else None)
+        if name is None or own is None:
+            return None
+        found = NamedUnit(name, self._displayed(name, own))
+        if found.unit is None or (own.unit is not None and not found.fits(own)):
+            return None
+        return replace(found, unit=replace(found.unit, offset=0.0)) if _is_relative(variable) else found
+
+    def _displayed(self, name: str, own: NamedUnit) -> Unit | None:
+        known, unit = named_unit(name).unit, own.unit or Unit((0,) * len(BASE_SYMBOLS))
+        of_unit = self._declared.get(own.name)
+        display = next((d for d in of_unit.displayUnits if d.name == name), None) if of_unit is not None else None
+        if known is not None or display is None:
+            return known or self._defined(name)
+        factor = unit.factor / display.factor if display.factor else 0.0
+        return replace(unit, factor=factor, offset=unit.offset - factor * display.offset)
+
     def _defined(self, name: str) -> Unit | None:
         defined = self._declared.get(name)
         if defined is None or defined.baseUnit is None:

@@ -57,7 +57,7 @@ def comparison_figure(
     Returns:
         The axes; without curves they say so.
     """
-    ax = axes_or_new(ax)
+    ax, signal = axes_or_new(ax), signal.as_shown()
     curves = signal.curves
     if curves is None:
         return _empty(ax, signal)
@@ -107,7 +107,7 @@ def comparison_picture(signal: SignalComparison, kind: str) -> bytes:
     Args:
         signal: the comparison, with its curves. kind: of file, ``png`` or ``svg``.
     """
-    figure = new_figure((WIDTH, HEIGHT))
+    signal, figure = signal.as_shown(), new_figure((WIDTH, HEIGHT))
     headline(figure, f"{signal.name}: {signal.status}")
     whole, error, zoom = figure.subplots(3, 1, height_ratios=(1.15, 0.8, 1.15))
     comparison_figure(signal, whole)

@@ -16,6 +16,7 @@ from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, s
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
 from cosim.report.figures.scales import bounded, value_limits
 from cosim.report.overlay.overlaid_runs import OverlayRun, observers_of, one_each
+from cosim.results.shown_unit import ShownUnit, shared_unit
 
 WIDTH, _FIRST_PANEL, _NEXT_PANEL = 8.2, 3.3, 2.2  # inches
 KMH = 3.6  # km/h in a m/s
@@ -124,16 +125,17 @@ def _estimate_overlay(runs: Sequence[OverlayRun], signal: Literal["slip", "adhes
 
 @styled
 def _signal_figure(runs: Sequence[OverlayRun], name: str) -> Figure | None:
-    """One recorded signal of all runs in its SI unit, or None where no run has it."""
+    """One recorded signal of all runs, or None where no run has it."""
     found = [(i, run) for i, run in enumerate(runs) if recorded(run.result, name) is not None]
     if not found:
         return None
     ax = _axes(runs, [("", {})])[0]
-    unit = next((s.unit for _, run in found for s in run.result.signals if s.name == name), "")
+    units = [s.shown for _, run in found for s in run.result.signals if s.name == name]
+    unit = shared_unit(units) if units else ShownUnit("unit unknown")
     for i, run in found:
-        values = bounded(run.result[name])
+        values = bounded(unit.values(run.result[name]))
         ax.plot(*thin(run.result.time, np.where(np.isfinite(values), values, np.nan)), label=run.label, **run_line(i))
-    return _finished([ax], f"{name} [{unit or 'unit unknown'}]")
+    return _finished([ax], f"{name} [{unit.name}]")
 
 
 def _panels(runs: Sequence[OverlayRun], has: Callable[[OverlayRun, str], bool]) -> list[Panel]:

@@ -35,6 +35,7 @@ from typing import Literal
 
 import numpy as np
 
+from cosim.results.shown_unit import ShownUnit
 from fmus.tables.table import Table
 
 Mood = Literal["good", "doubt", "bad", ""]
@@ -59,6 +60,8 @@ class PageCurve:
 
     Args:
         name: unique in its recording, ``component.signal``. values: shape (rows,); NaN is a gap. unit: of the values.
+        shown: in which they are shown, where that is not `unit`; curves of several units that share an axis are shown
+            in the one in which they are kept.
         held: whether a value holds until the next one; else lines join them.
         description: one line. look: see `Look`. label: text to show for it; its name where empty.
     """
@@ -70,6 +73,7 @@ class PageCurve:
     description: str = ""
     look: Look = ""
     label: str = ""
+    shown: ShownUnit | None = None
 
 
 @dataclass(frozen=True)

@@ -93,6 +93,8 @@ class _Packer:
     def _curve(self, curve: PageCurve, packed: PackedColumn) -> dict[str, Any]:
         entry = {name: getattr(curve, name) for name in ("name", "unit", "held", "description", "look", "label")}
         entry |= {"ascends": _ascends(curve.values)}
+        if (shown := curve.shown) is not None and shown.name != curve.unit:
+            entry["shown"] = {"unit": shown.name, "factor": shown.factor, "offset": shown.offset}
         if packed.size > self.room:
             self.reduced.append(curve.name)
             return entry | self._extremes(curve.values)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cosim.report.live.live_page import PageCurve, PagePanel, PageRecording
+from cosim.results.shown_unit import ShownUnit, shared_unit
 from fmus.tables.line_picture import Line, line_picture
 
 _PANELS = 2
@@ -24,12 +25,20 @@ def _picture(recordings: Sequence[PageRecording], panel: PagePanel, settled: flo
     drawn = [(r, c) for name in panel.curves for r in recordings for c in r.curves if c.name == name]
     if not drawn:
         return ""
-    units = {curve.unit for _, curve in drawn}
+    shown = {id(c): _unit(c, [other for _, other in drawn]) for _, c in drawn}
+    units = {unit.name for unit in shown.values()}
     title = f"{panel.title} [{min(units)}]" if len(units) == 1 and units != {"1"} else panel.title
     about = drawn[0][0]
     x_title = about.x_name if about.x_unit == "1" else f"{about.x_name} [{about.x_unit}]"
-    lines = [Line(_label(r, c, recordings, panel), r.x, c.values, c.look, c.held) for r, c in drawn]
+    lines = [
+        Line(_label(r, c, recordings, panel), r.x, shown[id(c)].values(c.values), c.look, c.held) for r, c in drawn
+    ]
     return line_picture(title, lines, x_title, settled)
+
+
+def _unit(curve: PageCurve, drawn: Sequence[PageCurve]) -> ShownUnit:
+    """The unit in which a curve is drawn: that of all curves beside it that are kept in its unit."""
+    return shared_unit(c.shown or ShownUnit(c.unit, kept=c.unit) for c in drawn if c.unit == curve.unit)
 
 
 def _label(recording: PageRecording, curve: PageCurve, recordings: Sequence[PageRecording], panel: PagePanel) -> str:

@@ -5,6 +5,7 @@ it is worst. Imports NumPy only.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,9 +42,10 @@ def _both(
     yield (
         comparison.reference,
         curves.reference_time,
-        PageCurve(signal.name, curves.reference, signal.unit, look="true"),
+        PageCurve(signal.name, curves.reference, signal.unit, look="true", shown=signal.shown),
     )
-    yield comparison.result, curves.result_time, PageCurve(signal.name, curves.result, signal.unit)
+    result = PageCurve(signal.name, curves.result, signal.unit, shown=signal.shown)
+    yield comparison.result, curves.result_time, result
 
 
 def _worst(comparison: Comparison) -> list[SignalComparison]:
@@ -52,26 +54,26 @@ def _worst(comparison: Comparison) -> list[SignalComparison]:
 
 def _tube_and_error(signal: SignalComparison, curves: Curves) -> Iterator[PageRecording]:
     """The tube, whose pieces are parted by gaps; the error; the band that it may lie in."""
-    name, unit = signal.name, signal.unit
+    name, unit, shown = signal.name, signal.unit, signal.shown
+    difference = replace(shown, offset=0.0)
     gap = np.isnan(curves.tube_time)
     if not gap.all() and len(gap):
         places = np.maximum.accumulate(np.where(gap, 0, np.arange(len(gap))))
         lower, upper = (np.where(gap, np.nan, edge) for edge in (curves.lower, curves.upper))
         time = np.maximum.accumulate(np.where(gap, -np.inf, curves.tube_time)[places])
         edges = [(f"{name} {_LOWER}", lower), (f"{name} {_UPPER}", upper)]
-        yield PageRecording(
-            TUBE, time, [PageCurve(n, v, unit, look="allowed", label=n.removeprefix(f"{name} ")) for n, v in edges]
-        )
+        drawn = [PageCurve(n, v, unit, look="allowed", label=n.removeprefix(f"{name} "), shown=shown) for n, v in edges]
+        yield PageRecording(TUBE, time, drawn)
     if len(curves.error_time):
-        yield PageRecording(ERROR, curves.error_time, [PageCurve(f"{name} {_OFF}", curves.error, unit, label=ERROR)])
+        error = PageCurve(f"{name} {_OFF}", curves.error, unit, label=ERROR, shown=difference)
+        yield PageRecording(ERROR, curves.error_time, [error])
     ends = [t for t in (curves.reference_time, curves.result_time) if len(t)]
     if curves.allowed > 0.0 and ends:
         span = np.array([min(t[0] for t in ends), max(t[-1] for t in ends)])
         band = [(f"{name} {_BELOW}", -curves.allowed), (f"{name} {_ABOVE}", curves.allowed)]
         text = {n: n.removeprefix(f"{name} ") for n, _ in band}
-        yield PageRecording(
-            "allowed", span, [PageCurve(n, np.full(2, v), unit, look="allowed", label=text[n]) for n, v in band]
-        )
+        drawn = [PageCurve(n, np.full(2, v), unit, look="allowed", label=text[n], shown=difference) for n, v in band]
+        yield PageRecording("allowed", span, drawn)
 
 
 def comparison_panels(comparison: Comparison) -> list[PagePanel]:

@@ -12,7 +12,7 @@ import numpy as np
 from cosim.evaluation.roles import UNITS, Quantity, estimate, estimation_error, label, recorded
 from cosim.evaluation.spec import ReportSpec
 from cosim.report.live.live_page import Look, PageCurve, PagePanel, PageRecording
-from cosim.results.result import Result
+from cosim.results.result import Result, SignalInfo
 
 QUANTITIES: tuple[Quantity, ...] = ("speed", "position")
 _SHOWN_UNITS, _SHOWN_CURVES = 3, 6
@@ -38,7 +38,7 @@ def error_panel(quantity: Quantity) -> str:
 
 
 def run_recording(result: Result, spec: ReportSpec, name: str = "run") -> PageRecording:
-    """All recorded signals in their declared units, then the errors of the observers.
+    """All recorded signals, shown in their own units, then the errors of the observers.
 
     Args:
         result: the run. spec: roles. name: of the recording.
@@ -47,13 +47,11 @@ def run_recording(result: Result, spec: ReportSpec, name: str = "run") -> PageRe
     known = {signal.name: signal for signal in result.signals}
     curves = []
     for column in (result.table.dtype.names or ())[1:]:
-        signal = known.get(column)
-        unit, held, text = (
-            (signal.unit, signal.variability == "discrete", signal.description) if signal else ("1", False, "")
-        )
+        signal = known.get(column, SignalInfo(column))
+        unit, held, text = signal.unit, signal.variability == "discrete", signal.description
         component, _, variable = column.partition(".")
         shown = f"{spec.labels[component]}: {variable}" if component in spec.labels else ""
-        curves.append(PageCurve(column, result[column], unit, held, text, looks.get(column, ""), shown))
+        curves.append(PageCurve(column, result[column], unit, held, text, looks.get(column, ""), shown, signal.shown))
     return PageRecording(name, result.time, [*curves, *_errors(result, spec)])
 
 
@@ -130,12 +128,9 @@ def _changing_panels(results: Sequence[Result]) -> list[PagePanel]:
         for signal in result.signals:
             values = result[signal.name]
             finite = values[np.isfinite(values)]
-            if (
-                len(finite)
-                and np.min(finite) < np.max(finite)
-                and signal.name not in by_unit.setdefault(signal.unit, [])
-            ):
-                by_unit[signal.unit].append(signal.name)
+            names = by_unit.setdefault(signal.shown.name, [])
+            if len(finite) and np.min(finite) < np.max(finite) and signal.name not in names:
+                names.append(signal.name)
     ordered = sorted(
         ((u, names) for u, names in by_unit.items() if names), key=lambda entry: (entry[0] == "1", -len(entry[1]))
     )

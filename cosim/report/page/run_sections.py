@@ -129,14 +129,16 @@ _SIGNAL_COLUMNS = (
 
 
 def signals_table(result: Result) -> Table:
-    """Every recorded signal: smallest, largest, mean and last value, and whether it never changes or is not finite
-    somewhere.
+    """Every recorded signal in the unit in which it is shown: smallest, largest, mean and last value, and whether it
+    never changes or is not finite somewhere.
 
     Args:
         result: the run.
     """
     signals = result.signals if len(result.time) else []
-    rows = [[s.name, s.unit, *_numbers(result.time, result[s.name]), s.description] for s in signals]
+    rows = [
+        [s.name, s.shown.name, *_numbers(result.time, s.shown.values(result[s.name])), s.description] for s in signals
+    ]
     return Table("signals", _SIGNAL_COLUMNS, rows).filled()
 
 

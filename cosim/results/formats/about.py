@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
+from cosim.results.si import convert
 from cosim.results.summary_file import restored
 from cosim.results.table_layout import column_names
 from fmus.tables.plain_data import jsonable
+from plant_models.hybrid.units import parse_unit
 
 BLOCK = 1 << 25  # bytes of a table that are turned over at a time: it may be larger than the memory
 _FROM_JSON = {None: math.nan, "inf": math.inf, "-inf": -math.inf}
@@ -30,6 +33,61 @@ def signals_of(result: ResultData) -> list[SignalInfo]:
     """
     known = {signal.name: signal for signal in result.signals}
     return [known.get(name, SignalInfo(name)) for name in column_names(result.table)[1:]]
+
+
+SIGNAL_KEYS = (
+    "unit",
+    "si_unit",
+    "display_unit",
+    "declared_unit",
+    "display_scale",
+    "variability",
+    "can_be_missing",
+    "description",
+)
+"""Keys of what a file says of a signal: ``unit`` is that of its numbers, ``si_unit`` the one of SI where this is
+another one."""
+
+
+def signal_texts(signal: SignalInfo, is_own: bool) -> dict[str, str]:
+    """What a file says of a signal, a text for each of the keys; empty where there is nothing to say.
+
+    Args:
+        signal: what it is. is_own: whether the file holds it in its declared unit, else in SI.
+    """
+    own = {"unit": signal.declared_unit, "si_unit": signal.unit} if is_own else {"si_unit": None}
+    scale = None if signal.display_scale is None else " ".join(map(repr, signal.display_scale))
+    known = {**asdict(signal), "display_scale": scale, "can_be_missing": signal.can_be_missing or None, **own}
+    return {key: str(known[key] or "") for key in SIGNAL_KEYS}
+
+
+def signal_of_texts(name: str, texts: Mapping[str, str | None]) -> SignalInfo:
+    """What a signal is by what a file says of it; the other way of `signal_texts`.
+
+    Args:
+        name: of the signal. texts: of the keys that the file has; an older one has fewer.
+    """
+    scale = [float(number) for number in (texts.get("display_scale") or "").split()]
+    return SignalInfo(
+        name,
+        texts.get("si_unit") or texts.get("unit") or "1",
+        texts.get("display_unit") or None,
+        "discrete" if texts.get("variability") == "discrete" else "continuous",
+        texts.get("description") or "",
+        texts.get("can_be_missing") == str(True),
+        texts.get("declared_unit") or None,
+        (scale[0], scale[1]) if len(scale) == 2 else None,
+    )
+
+
+def bring_to_si(table: np.ndarray, texts: Mapping[str, Mapping[str, str | None]]) -> np.ndarray:
+    """Rows as they are kept, of those that a file holds.
+
+    Args:
+        table: structured rows; changed in place. texts: what the file says of signals, by name.
+    """
+    convert(table, {name: parse_unit(says["unit"] or "1") for name, says in texts.items() if says.get("si_unit")})
+    return table
 
 
 def blocks(table: np.ndarray, size: int = BLOCK) -> Iterator[tuple[int, np.ndarray]]:

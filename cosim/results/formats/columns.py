@@ -11,7 +11,6 @@ from types import MappingProxyType
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.declared_units import in_si_only
 from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.si import in_si
 from cosim.results.table_layout import table_of
@@ -53,7 +52,7 @@ def result_of_columns(
     check_time(source, table["time"])
     signals = [_signal(described(name), units.get(name), name in texts) for name in order[1:]]
     table, described_in_si = in_si(table, signals, lambda name: parse_unit(units.get(name) or "1"))
-    signals = in_si_only(described_in_si)  # no FMU declared another one
+    signals = [replace(signal, declared_unit=None) for signal in described_in_si]  # no FMU declared another one
     return ResultData(
         table, signals, summary={TEXTS: {name: list(items) for name, items in texts.items()}} if texts else {}
     )

@@ -1,7 +1,8 @@
 """Results as HDF5, to the last bit: for MATLAB's ``h5read``, xarray, Julia. Touches only the file it is given.
 
-A dataset each for ``time`` and every signal with the attributes ``unit``, ``units`` (the name xarray knows),
-``variability``, ``description`` and, where there is one, ``display_unit``; ``time`` is the dimension scale of all. The
+A dataset each for ``time`` and every signal, in the unit that its FMU declares, with the attributes ``unit`` and
+``units`` (the name xarray knows), ``si_unit`` where this is another one, ``variability``, ``description`` and, where
+there is one, ``display_unit``; ``time`` is the dimension scale of all. The
 group ``events`` holds the telegrams, a dataset each column. Summary and failure are attributes of the file, the summary
 as JSON.
 """
@@ -11,7 +12,7 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from types import TracebackType
@@ -20,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.formats.about import BLOCK, blocks, signals_of
+from cosim.results.declared_units import in_own_units, own_units
+from cosim.results.formats.about import BLOCK, blocks, bring_to_si, signal_of_texts, signal_texts, signals_of
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.format import Format
 from cosim.results.optional import optional_module
@@ -123,8 +125,8 @@ def _h5py() -> Any:
     return optional_module("h5py", "HDF5 files")
 
 
-def _columns(file: Any, rows: int, chunk: int, signals: Sequence[SignalInfo]) -> list[Any]:
-    """Empty datasets of time and signals, `chunk` rows compressed together."""
+def _columns(file: Any, rows: int, chunk: int, signals: Sequence[SignalInfo], own: Container[str]) -> list[Any]:
+    """Empty datasets of time and signals, `chunk` rows compressed together; of some in their own units."""
     storage = (
         {"chunks": (min(rows, chunk),), "compression": "gzip", "compression_opts": 1, "shuffle": True}
         if rows > FEW
@@ -138,15 +140,10 @@ def _columns(file: Any, rows: int, chunk: int, signals: Sequence[SignalInfo]) ->
         name = _dataset_name(signal.name, taken)
         dataset = file.create_dataset(name, (rows,), "f8", **storage)
         dataset.dims[0].attach_scale(time)
-        dataset.attrs.update(
-            {"column": place, "unit": signal.unit, "units": signal.unit, "variability": signal.variability}
-        )
-        dataset.attrs["description"] = signal.description
-        if signal.description:
-            dataset.attrs["long_name"] = signal.description  # as xarray calls it
-        for key in ("display_unit", "declared_unit"):
-            if getattr(signal, key) is not None:
-                dataset.attrs[key] = getattr(signal, key)
+        texts = signal_texts(signal, signal.name in own)
+        texts |= {"units": texts["unit"], "long_name": signal.description}  # as xarray calls them
+        dataset.attrs.update({key: text for key, text in texts.items() if text or key == "description"})
+        dataset.attrs["column"] = place
         if name != signal.name:
             dataset.attrs["name"] = signal.name
         datasets.append(dataset)
@@ -173,9 +170,10 @@ def _write_events(group: Any, events: Sequence[BaliseRecord]) -> None:
 def _ours(file: Any) -> ResultData:
     found = [dataset for name, dataset in file.items() if name not in (TIME, EVENTS)]
     datasets = sorted(found, key=lambda dataset: int(dataset.attrs["column"]))
-    signals = [_signal(dataset) for dataset in datasets]
+    texts = {_name(dataset): {key: _text(value) for key, value in dataset.attrs.items()} for dataset in datasets}
+    signals = [signal_of_texts(name, says) for name, says in texts.items()]
     columns = [dataset[:] for dataset in (file[TIME], *datasets)]
-    table = table_of([TIME, *(s.name for s in signals)], columns)
+    table = bring_to_si(table_of([TIME, *texts], columns), texts)
     stored = {name: file[EVENTS][name] for name in TELEGRAM_ROWS.columns}
     cells = {n: (c if n in TELEGRAM_ROWS.numbers else c.asstr())[:].tolist() for n, c in stored.items()}
     events = TELEGRAM_ROWS.records(cells)
@@ -183,16 +181,8 @@ def _ours(file: Any) -> ResultData:
     return ResultData(table, signals, events, summary, _text(file.attrs.get("failure")))
 
 
-def _signal(dataset: Any) -> SignalInfo:
-    known = {key: _text(dataset.attrs[key]) for key in dataset.attrs if key not in ("DIMENSION_LIST", "column")}
-    return SignalInfo(
-        known.get("name") or dataset.name.removeprefix("/"),
-        known["unit"] or "1",
-        known.get("display_unit"),
-        "discrete" if known["variability"] == "discrete" else "continuous",
-        known["description"] or "",
-        declared_unit=known.get("declared_unit"),
-    )
+def _name(dataset: Any) -> str:
+    return _text(dataset.attrs.get("name")) or dataset.name.removeprefix("/")
 
 
 def _text(value: Any) -> str | None:
@@ -238,7 +228,7 @@ class Hdf5Format(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        signals = signals_of(result)
+        signals, own = signals_of(result), own_units(result.table, result.signals)
         chunk = min(CHUNK, max(BLOCK // result.table.dtype.itemsize, 1))
         options = {"libver": ("v108", "latest"), "rdcc_nbytes": 8 * chunk}  # it keeps so much of each column
         h5py = _h5py()
@@ -247,8 +237,9 @@ class Hdf5Format(Format):
             file.attrs["summary"] = json.dumps(jsonable(result.summary), ensure_ascii=False, allow_nan=False)
             if result.failure is not None:
                 file.attrs["failure"] = result.failure
-            datasets = _columns(file, len(result.table), chunk, signals)
-            for start, rows in blocks(result.table):
+            datasets = _columns(file, len(result.table), chunk, signals, own)
+            for start, kept in blocks(result.table):
+                rows = in_own_units(kept, own)
                 for field, dataset in zip(result.table.dtype.names or (), datasets, strict=True):
                     dataset[start : start + len(rows)] = rows[field]
             _write_events(file.create_group(EVENTS), result.events)

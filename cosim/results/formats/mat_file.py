@@ -1,24 +1,25 @@
 """Results as a MATLAB file, to the last bit. Touches only the file it is given.
 
-In MATLAB: ``time`` and one column vector for each signal (``locomotive_position``), ``units.locomotive_position``, the
-struct ``signals`` of cell arrays (variable, name, unit, ...) in column order, and the struct ``events`` of columns.
+In MATLAB: ``time`` and one column vector for each signal (``locomotive_position``), in the unit that its FMU declares,
+``units.locomotive_position``, the struct ``signals`` of cell arrays (variable, name, unit, ...) in column order, and
+the struct ``events`` of columns.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy
 
-from cosim.results.formats.about import signals_of
+from cosim.results.declared_units import in_own_units, own_units
+from cosim.results.formats.about import SIGNAL_KEYS, bring_to_si, signal_of_texts, signal_texts, signals_of
 from cosim.results.formats.format import Format
 from cosim.results.record_rows import TELEGRAM_ROWS
-from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
+from cosim.results.result_data import BaliseRecord, ResultData
 from cosim.results.table_layout import table_of
 
 _RESERVED = ("time", "units", "signals", "events")
@@ -79,9 +80,9 @@ def _texts(value: Any, count: int) -> list[str]:
     return ["" if not isinstance(text, str) else text for text in value] if len(value) else [""] * count
 
 
-def _signals_struct(signals: Sequence[SignalInfo], legal: Mapping[str, str]) -> dict[str, np.ndarray]:
-    columns = {f.name: _cells([str(getattr(s, f.name) or "") for s in signals]) for f in fields(SignalInfo)}
-    return {"variable": _cells([legal[s.name] for s in signals]), **columns}
+def _signals_struct(texts: Mapping[str, Mapping[str, str]], legal: Mapping[str, str]) -> dict[str, np.ndarray]:
+    columns = {key: _cells([says[key] for says in texts.values()]) for key in SIGNAL_KEYS}
+    return {"variable": _cells([legal[name] for name in texts]), "name": _cells(list(texts)), **columns}
 
 
 def _events_struct(events: Sequence[BaliseRecord]) -> dict[str, np.ndarray]:
@@ -94,23 +95,12 @@ def _events_struct(events: Sequence[BaliseRecord]) -> dict[str, np.ndarray]:
     }
 
 
-def _read_signals(struct: Mapping[str, Any]) -> tuple[list[str], list[SignalInfo]]:
+def _read_signals(struct: Mapping[str, Any]) -> tuple[list[str], dict[str, dict[str, str | None]]]:
+    """Names of the variables, and what the file says of each signal; an older file says less."""
     variables = _texts(struct["variable"], 0)
-    known = [f.name for f in fields(SignalInfo) if f.name in struct]  # an older file has fewer
-    columns = {name: _texts(struct[name], len(variables)) for name in known}
+    columns = {key: _texts(struct[key], len(variables)) for key in ("name", *SIGNAL_KEYS) if key in struct}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
-    signals = [
-        SignalInfo(
-            **{
-                **row,
-                "display_unit": row["display_unit"] or None,
-                "declared_unit": row.get("declared_unit") or None,
-                "can_be_missing": row.get("can_be_missing") == str(True),
-            }
-        )
-        for row in rows
-    ]
-    return variables, signals
+    return variables, {row["name"]: {**row} for row in rows}
 
 
 def _read_events(struct: Mapping[str, Any]) -> list[BaliseRecord]:
@@ -131,13 +121,14 @@ class MatFormat(Format):
 
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
-        signals = signals_of(result)
-        names = [signal.name for signal in signals]
+        own = own_units(result.table, result.signals)
+        texts = {signal.name: signal_texts(signal, signal.name in own) for signal in signals_of(result)}
+        names, table = list(texts), in_own_units(result.table, own)
         legal = _matlab_names(names, _RESERVED)
-        content: dict[str, Any] = {"time": result.table["time"]}
-        content |= {legal[name]: result.table[name] for name in names}
-        content["units"] = {legal[s.name]: s.unit for s in signals}
-        content["signals"] = _signals_struct(signals, legal)
+        content: dict[str, Any] = {"time": table["time"]}
+        content |= {legal[name]: table[name] for name in names}
+        content["units"] = {legal[name]: says["unit"] for name, says in texts.items()}
+        content["signals"] = _signals_struct(texts, legal)
         content["events"] = _events_struct(result.events)
         with path.open("wb") as file:
             scipy.io.savemat(file, content, long_field_names=True, do_compression=True, oned_as="column")
@@ -147,9 +138,10 @@ class MatFormat(Format):
         with path.open("rb") as file:
             try:
                 content = scipy.io.loadmat(file, simplify_cells=True)
-                variables, signals = _read_signals(content["signals"])
+                variables, texts = _read_signals(content["signals"])
                 columns = [content["time"], *(content[variable] for variable in variables)]
                 events = _read_events(content["events"])
             except (KeyError, TypeError, ValueError, NotImplementedError) as error:
                 raise ValueError(f"{path} is not a MATLAB result file: {error}") from error
-        return ResultData(table_of(["time", *(s.name for s in signals)], columns), signals, events)
+        table = bring_to_si(table_of(["time", *texts], columns), texts)
+        return ResultData(table, [signal_of_texts(name, says) for name, says in texts.items()], events)

@@ -1,9 +1,10 @@
 """Results as Apache Parquet, to the last bit: for pandas, Polars, MATLAB's ``parquetread``. Touches only the file it is
 given.
 
-A column each for ``time`` and every signal; ``unit``, ``display_unit``, ``variability`` and ``description`` are the
-metadata of its field. The metadata of the file holds telegrams, summary and failure as JSON under ``fmu-observer``, and
-units by name where pandas looks for ``DataFrame.attrs``.
+A column each for ``time`` and every signal, in the unit that its FMU declares; ``unit`` (of the numbers), ``si_unit``
+where this is another one, ``display_unit``, ``variability`` and ``description`` are the metadata of its field. The
+metadata of the file holds telegrams, summary and failure as JSON under ``fmu-observer``, and units by name where pandas
+looks for ``DataFrame.attrs``.
 """
 
 from __future__ import annotations
@@ -15,7 +16,16 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import OutputError
-from cosim.results.formats.about import about_text, blocks, signals_of, with_about
+from cosim.results.declared_units import in_own_units, own_units
+from cosim.results.formats.about import (
+    about_text,
+    blocks,
+    bring_to_si,
+    signal_of_texts,
+    signal_texts,
+    signals_of,
+    with_about,
+)
 from cosim.results.formats.columns import result_of_columns
 from cosim.results.formats.format import Format
 from cosim.results.optional import optional_module
@@ -30,12 +40,6 @@ def _modules() -> tuple[Any, Any]:
     return arrow, parquet
 
 
-def _metadata(signal: SignalInfo) -> dict[str, str]:
-    known = {"unit": signal.unit, "variability": signal.variability, "description": signal.description}
-    more = {"display_unit": signal.display_unit, "declared_unit": signal.declared_unit}
-    return known | {name: unit for name, unit in more.items() if unit is not None}
-
-
 def _ours(file: Any, about: str) -> ResultData:
     schema = file.schema_arrow
     table = np.empty(file.metadata.num_rows, table_dtype(schema.names))
@@ -44,13 +48,18 @@ def _ours(file: Any, about: str) -> ResultData:
         for name, column in zip(schema.names, batch.columns, strict=True):
             table[name][start : start + len(batch)] = column.to_numpy(zero_copy_only=False)
         start += len(batch)
-    return with_about(table, [_signal(field) for field in schema][1:], about)
+    texts = {field.name: _texts(field) for field in schema}
+    signals = [signal_of_texts(name, texts[name]) for name in schema.names[1:]]
+    return with_about(bring_to_si(table, texts), signals, about)
+
+
+def _texts(field: Any) -> dict[str, str]:
+    return {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
 
 
 def _signal(field: Any) -> SignalInfo:
-    known = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-    kept = {key: known[key] for key in ("display_unit", "declared_unit", "variability", "description") if key in known}
-    return SignalInfo(field.name, known.get("unit") or known.get("units") or "1", **kept)
+    known = _texts(field)
+    return signal_of_texts(field.name, {"unit": known.get("units"), **known})
 
 
 def _foreign(source: str, table: Any) -> ResultData:
@@ -102,10 +111,14 @@ class ParquetFormat(Format):
     @staticmethod
     def write(path: Path, result: ResultData) -> None:  # noqa: D102 - see Format
         arrow, parquet = _modules()
-        signals = signals_of(result)
+        signals, own = signals_of(result), own_units(result.table, result.signals)
+        texts = {s.name: signal_texts(s, s.name in own) for s in signals}
         fields = [arrow.field("time", arrow.float64(), nullable=False, metadata={"unit": "s", "description": "time"})]
-        fields += [arrow.field(s.name, arrow.float64(), nullable=False, metadata=_metadata(s)) for s in signals]
-        units = {"units": {"time": "s"} | {s.name: s.unit for s in signals}}
+        fields += [
+            arrow.field(name, arrow.float64(), nullable=False, metadata={k: v for k, v in says.items() if v})
+            for name, says in texts.items()
+        ]
+        units = {"units": {"time": "s"} | {name: says["unit"] for name, says in texts.items()}}
         schema = arrow.schema(
             fields, metadata={_ABOUT: about_text(result), "PANDAS_ATTRS": json.dumps(units, ensure_ascii=False)}
         )
@@ -114,7 +127,8 @@ class ParquetFormat(Format):
             path.open("wb") as file,
             parquet.ParquetWriter(file, schema, use_dictionary=False, compression="snappy") as writer,
         ):
-            for _, rows in blocks(result.table):
+            for _, kept in blocks(result.table):
+                rows = in_own_units(kept, own)
                 columns = [arrow.array(np.ascontiguousarray(rows[name])) for name in names]
                 writer.write_table(arrow.Table.from_arrays(columns, schema=schema))
 

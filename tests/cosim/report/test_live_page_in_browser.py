@@ -16,6 +16,7 @@ from playwright.sync_api import Page
 
 from cosim.report.live import page_data
 from cosim.report.live.live_page import LivePage, PageCurve, PagePanel, PageRecording, PageVerdict
+from cosim.results.shown_unit import ShownUnit
 
 pytestmark = pytest.mark.browser
 EXPLORER = "document.getElementById('explorer').explorer"
@@ -336,3 +337,37 @@ def test_without_javascript_sentence_and_tables_are_there(tmp_path: Path) -> Non
         assert page.locator("tbody tr").count() == 12
     finally:
         context.close()
+
+
+def test_an_axis_is_in_the_unit_of_all_its_curves_or_in_the_one_of_si(tmp_path: Path) -> None:
+    fast, si = ShownUnit("km/h", 1.0 / 3.6, 0.0, "m/s"), ShownUnit("km", 1e3, 0.0, "m")
+    curves = [
+        PageCurve("plant.vIst", np.full(len(TIME), 10.0), "m/s", shown=fast),
+        PageCurve("plant.vSoll", np.full(len(TIME), 20.0), "m/s", shown=fast),
+        PageCurve("observer.speed", np.full(len(TIME), 15.0), "m/s"),
+        PageCurve("plant.way", 10.0 * TIME, "m", shown=si),
+    ]
+    panels = [
+        PagePanel("Own", ["plant.vIst", "plant.vSoll"]),
+        PagePanel("Mixed", ["plant.vIst", "observer.speed", "plant.way"]),
+    ]
+    page = LivePage(
+        title="Units", verdict=PageVerdict("Two."), recordings=[PageRecording("run", TIME, curves)], panels=panels
+    )
+    with opened(page, tmp_path) as shown:
+        shown.evaluate(f"{EXPLORER}.point(50.0)")
+        entries = shown.locator(".entry").all_inner_texts()
+        said = [" ".join(text.split()) for text in entries]
+        assert said[:2] == ["plant.vIst 36 km/h", "plant.vSoll 72 km/h"]
+        assert said[2:] == ["plant.vIst 10 m/s", "observer.speed 15 m/s", "plant.way 0.5 km"]
+        units = shown.evaluate("[...document.querySelectorAll('.signal .unit')].map((e) => e.textContent)")
+        assert units == ["km/h", "km/h", "km", "m/s"]
+        assert shown.evaluate(f"{EXPLORER}.subtract('plant.vSoll', 'plant.vIst')") == ""
+        shown.evaluate(f"{EXPLORER}.point(50.0)")
+        assert shown.locator(".entry .value").first.inner_text() == "36 km/h"
+        assert shown.evaluate(f"{EXPLORER}.subtract('plant.vSoll', 'observer.speed')") == ""
+        shown.evaluate(f"{EXPLORER}.point(50.0)")
+        assert shown.locator(".entry .value").first.inner_text() == "5 m/s"
+        shown.get_by_label("Over").select_option(label="plant.way")
+        shown.wait_for_function(f"{EXPLORER}.range[1] === 1")
+        assert shown.evaluate(f"{EXPLORER}.axisName()") == "plant.way [km]"

@@ -129,10 +129,10 @@ def test_an_outcome_is_a_mapping_of_its_columns(outcome: cosim.Outcome) -> None:
 
 def test_signals_are_drawn_by_unit_and_a_notebook_shows_the_figure(outcome: cosim.Outcome) -> None:
     figure: Any = outcome.plot("*.speed", "locomotive.position")
-    assert [ax.get_ylabel() for ax in figure.axes] == ["locomotive.position [m]", "[m/s]"]
+    assert [ax.get_ylabel() for ax in figure.axes] == ["locomotive.position [m]", "[km/h]"]
     drawn = {line.get_label(): line for ax in figure.axes for line in ax.get_lines()}
     assert set(drawn) == {"locomotive.position", "locomotive.speed", "observer.speed"}
-    np.testing.assert_array_equal(drawn["observer.speed"].get_ydata(), outcome["observer.speed"])
+    np.testing.assert_allclose(drawn["observer.speed"].get_ydata(), 3.6 * outcome["observer.speed"], rtol=1e-14)
     assert figure._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(OutputError, match=r"did you mean 'observer\.speed'"):
         outcome.plot("observer.sped")

@@ -46,21 +46,24 @@ class Chart {
     return made;
   }
 
-  /** The curves that are drawn, with the values that are: those of the run, or their difference to another run. */
+  /** The curves that are drawn, with the values that are: those of the run, or their difference to another run. Curves
+      that are kept in one unit have one axis: in the unit in which all of them are shown, else in that one. */
   async parts() {
     const {explorer} = this, wanted = this.panel.curves.flatMap((name) => explorer.curvesOf(name));
     await Promise.all(wanted.map((curve) => curve.load()));
     const minus = explorer.minus, found = [];
+    const isShown = (curve) => wanted.every((other) => other.unit !== curve.unit || other.shown.unit === curve.shown.unit);
     for (const curve of wanted) {
       const base = minus === null ? null : explorer.curvesOf(curve.name).find((c) => c.run === minus);
       const abscissa = await explorer.abscissa(curve.recording);
       if (!abscissa) continue;
-      const part = {curve, x: curve.over(abscissa), y: curve.y, unit: curve.unit};
+      const unit = isShown(curve) ? curve.shown : {unit: curve.unit, factor: 1, offset: 0};
+      const part = {curve, x: curve.over(abscissa), y: curve.inUnit(isShown(curve)), ...unit};
       if (minus !== null) {
         if (!base || base === curve || base.unit !== curve.unit) continue;
         await base.load();
         const other = base.over(await explorer.abscissa(base.recording));
-        part.y = Float64Array.from(part.x, (place, row) => curve.y[row] - base.at(other, place));
+        part.y = Float64Array.from(part.x, (place, row) => (curve.y[row] - base.at(other, place)) / part.factor);
       }
       found.push(part);
     }
@@ -243,7 +246,8 @@ class Chart {
         ctx.lineWidth = 2.5 * ratio;
         ctx.strokeStyle = themed("bad");
         ctx.beginPath();
-        ctx.arc(u.valToPos(mark.start, "x", true), u.valToPos(mark.value, `y ${this.visible[0].unit}`, true), 7 * ratio, 0, 2 * Math.PI);
+        const [{unit, factor, offset}] = this.visible;
+        ctx.arc(u.valToPos(mark.start, "x", true), u.valToPos((mark.value - offset) / factor, `y ${unit}`, true), 7 * ratio, 0, 2 * Math.PI);
         ctx.stroke();
       }
     }

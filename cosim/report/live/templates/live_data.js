@@ -62,6 +62,15 @@ class LiveCurve {
     this.run = index;
     this.text = entry.label || entry.name;
     this.whole = !entry.rows;
+    this.shown ??= {unit: this.unit, factor: 1, offset: 0};
+  }
+
+  /** Its values in the unit in which it is shown, or in the one in which it is kept. */
+  inUnit(isShown) {
+    const {factor, offset} = this.shown;
+    if (!isShown || (factor === 1 && offset === 0)) return this.y;
+    if (this.convertedOf !== this.y) Object.assign(this, {convertedOf: this.y, converted: this.y.map((v) => (v - offset) / factor)});
+    return this.converted;
   }
 
   /** Decode it: of a long curve its extremes first, see `refine`. */
@@ -109,6 +118,7 @@ class Difference extends LiveCurve {
   constructor(first, second, ownAbscissa) {
     const name = `${first.name} − ${second.name}`;
     super(first.recording, first.run, {name, unit: first.unit, held: first.held && second.held, look: "", label: "", ascends: false, description: `Difference of ${first.name} and ${second.name}`});
+    if (first.shown.unit === second.shown.unit) this.shown = {...first.shown, offset: 0};
     Object.assign(this, {first, second, ownAbscissa, whole: first.whole && second.whole});
   }
 

@@ -51,7 +51,7 @@ class Explorer {
       if (!curve?.ascends || !curve.whole) return null;
       await curve.load();
       await curve.refine();
-      return separated(curve.y);
+      return separated(curve.inUnit(true));
     })();
   }
 
@@ -65,7 +65,7 @@ class Explorer {
   whole() { return this.limits; }
 
   axisName() {
-    const curve = this.curves.find((c) => c.name === this.axis), x = curve ?? this.data.recordings[0]?.x ?? {name: "time", unit: "s"};
+    const curve = this.curves.find((c) => c.name === this.axis), x = curve?.shown ?? this.data.recordings[0]?.x ?? {name: "time", unit: "s"};
     const name = curve ? curve.text : x.name;
     const begun = /^[a-z ]+$/.test(name) ? `${name.charAt(0).toUpperCase()}${name.slice(1)}` : name;  // a word, not a signal
     return `${begun}${x.unit && x.unit !== "1" ? ` [${x.unit}]` : ""}`;
@@ -176,7 +176,7 @@ class Explorer {
       if (chart.panel.curves.length) await chart.build(); else this.remove(chart);
     }
     if (!holding.length) {
-      const unit = this.curvesOf(name)[0].unit, goal = this.goal.value;
+      const {unit} = this.curvesOf(name)[0].shown, goal = this.goal.value;
       const chart = goal === "new" ? null : goal === "unit" ? this.charts.find((c) => c.isOwn && c.unit === unit) : this.charts[Number(goal)];
       if (chart) { chart.panel.curves = [...chart.panel.curves, name]; await chart.build(); await this.refine(); } else {
         await this.add({title: goal === "new" ? name : `Signals [${unit}]`, curves: [name]});
@@ -299,7 +299,7 @@ class Explorer {
 
   /** The form that asks for the difference of two signals. */
   differences() {
-    const names = element("datalist", {id: "signal-names"}, ...this.names.map((name) => element("option", {value: name, label: `[${this.curvesOf(name)[0].unit}]`})));
+    const names = element("datalist", {id: "signal-names"}, ...this.names.map((name) => element("option", {value: name, label: `[${this.curvesOf(name)[0].shown.unit}]`})));
     const [first, second] = ["first signal", "minus second signal"].map((text) => {
       const field = element("input", {type: "search", placeholder: text, ariaLabel: text});
       field.setAttribute("list", names.id);
@@ -326,13 +326,13 @@ class Explorer {
     for (const name of this.names) {
       const [curve] = this.curvesOf(name);
       if (curve.look === "allowed") continue;  // the edge of a band
-      const text = `${name} ${curve.unit} ${curve.label} ${curve.description}`.toLowerCase();
+      const text = `${name} ${curve.unit} ${curve.shown.unit} ${curve.label} ${curve.description}`.toLowerCase();
       if (!words.every((word) => text.includes(word))) continue;
       const component = name.includes(".") ? name.slice(0, name.indexOf(".")) : "";
       groups.set(component, [...(groups.get(component) ?? []), curve]);
     }
     const entry = (curve) => {
-      const units = [...new Set(this.curvesOf(curve.name).map((c) => c.unit))];
+      const units = [...new Set(this.curvesOf(curve.name).map((c) => c.shown.unit))];
       const made = element("button", {type: "button", className: "signal", title: curve.description, onclick: () => this.toggle(curve.name)},
         element("span", {textContent: curve.name.slice(curve.name.indexOf(".") + 1)}), element("span", {className: "unit", textContent: units.map((u) => u === "1" ? "" : u).join(" / ")}));
       made.dataset.name = curve.name;
