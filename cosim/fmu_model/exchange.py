@@ -7,10 +7,13 @@ sticks, a zone that is degraded) stays so.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ctypes
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy
 
 from cosim.fmu_model.sealed import Array, FmuModelError, SealedModel, Way, declared_states
 from fmus.exchange.cvode import Cvode, SolverError
@@ -20,6 +23,11 @@ class ExchangeModel(SealedModel):
     """A model exchange FMU; arguments as for `SealedModel`. Its states are those that it declares, in its own order."""
 
     way: Way = "exchange"
+
+    @cached_property
+    def _slope_calls(self) -> dict[tuple[str, ...], list[Callable[[], Array]]]:
+        """Calls for directional derivatives along each state, by whose derivatives."""
+        return {}
 
     def derivatives(self) -> Array:
         """Derivatives of the states where the instance stands, shape (n,)."""
@@ -106,8 +114,16 @@ class ExchangeModel(SealedModel):
             found[:n], found[n:] = self.derivatives(), (A @ here[n:].reshape(n, n)).ravel()
             return 0
 
-        own = self.instance.motion.solver
-        solver = Cvode(n + n * n, 0, rates, rates, own.tolerance, np.ones(n + n * n))
+        def jacobian(instant: float, at: Any, _rates: Any, columns: int) -> int:
+            """Without the curvature of A, which a solver can do without."""
+            self.move(instant, np.ctypeslib.as_array(at)[:n], u)
+            A = self.slopes(rows)
+            found = scipy.linalg.block_diag(A, np.kron(A, np.eye(n))).T
+            ctypes.memmove(columns, np.ascontiguousarray(found).ctypes.data, found.nbytes)
+            return 0
+
+        size, tolerance = n + n * n, self.instance.motion.solver.tolerance
+        solver = Cvode(size, 0, rates, rates, tolerance, np.ones(size), jacobian=jacobian)
         whole = solver.states
         whole[:] = np.concatenate([x, np.eye(n).ravel()])
         try:
@@ -130,8 +146,11 @@ class ExchangeModel(SealedModel):
         Args:
             unknowns: derivatives of states, or outputs.
         """
-        ask = self.instance.directional_derivative
-        columns = self.called(lambda: [ask(unknowns, [name], [1.0]) for name in self.states])
+        instance, wanted = self.instance, tuple(unknowns)
+        if wanted not in self._slope_calls:
+            self._slope_calls[wanted] = [instance.derivative_call(wanted, [name], [1.0]) for name in self.states]
+        calls = self._slope_calls[wanted]
+        columns = self.called(lambda: [instance.guard("getDirectionalDerivative", call) for call in calls])
         return np.array(columns).T.reshape(len(unknowns), len(self.states))
 
     def _own_states(self, stated: Sequence[str] | None) -> Sequence[str]:

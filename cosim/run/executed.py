@@ -37,6 +37,7 @@ from cosim.run.summary import evaluated_summary, run_summary
 from cosim.run.values_not_taken import values_not_taken
 from cosim.structure.divergence import explained_failure
 from fmu_observer.annotated_variable import declared_warnings
+from fmus.exchange.slave import solver_of
 from fmus.fmi.surroundings import SurroundingsOfSteps, is_left
 from plant_models.hybrid.missing import MISSED_SAMPLES
 from plant_models.hybrid.signal import OutputWarning
@@ -135,6 +136,14 @@ def _missed_samples(components: Mapping[str, Component]) -> Iterator[str]:
         count = component.missed_samples().get(MISSED_SAMPLES, 0)
         if count:
             yield f"{name}: {count} measurements were missing at its samples, and left out."
+
+
+def _differences_taken(components: Mapping[str, Component]) -> Iterator[str]:
+    """Notes of directional derivatives that the solver of a component did not use."""
+    for name, component in components.items():
+        solver = solver_of(component.slave)
+        if solver is not None and solver.motion is not None and solver.motion.told:
+            yield f"{name}: the solver takes {solver.motion.jacobian}."
 
 
 def _declared(table: np.ndarray, name: str, signal: str, warning: OutputWarning) -> Iterator[str]:
@@ -277,7 +286,7 @@ def _summary(
     gaps |= _counted_gaps(ready.coupled.connections, ready.checked.certificates, result, start)
     certificates, beyond = findings_after(ready.checked.certificates, gaps)
     remarks.warn(*beyond)
-    remarks.note(*_missed_samples(ready.coupled.components))
+    remarks.note(*_missed_samples(ready.coupled.components), *_differences_taken(ready.coupled.components))
     found = _balise_summary(ready.services, gap)
     found |= {"certificates": certificates, "premises": premises, "warnings": remarks.warnings, "notes": remarks.notes}
     found |= evaluated_summary(result, spec)

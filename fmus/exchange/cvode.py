@@ -1,7 +1,7 @@
 """CVODE of SUNDIALS, as fmpy brings it: one internal step at a time, roots, dense output. Knows no FMU.
 
-Variable order and step; BDF for stiff equations, Adams for others, both with Newton's method and a dense Jacobian by
-differences. Hindmarsh et al., "SUNDIALS", ACM Trans. Math. Softw. 31 (2005).
+Variable order and step; BDF for stiff equations, Adams for others, both with Newton's method and a dense Jacobian, by a
+function or by differences. Hindmarsh et al., "SUNDIALS", ACM Trans. Math. Softw. 31 (2005).
 """
 
 from __future__ import annotations
@@ -25,6 +25,11 @@ up.
 """
 
 _RATES = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
+Jacobian = Callable[[float, Any, Any, int], int]
+"""Of an instant [s], states and derivatives there: writes the derivatives of these by the states, column by column, to
+the doubles at an address. Returns the same.
+"""
+_JACOBIAN = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_double, *[ctypes.c_void_p] * 7)
 _WEIGHTS = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 Native = tuple[CExchange, Any]
 """A model as C calls it, and the library whose functions do."""
@@ -102,7 +107,8 @@ class Cvode:
         count: number of states, at least one. root_count: number of root functions.
         rates, roots: see `Rates`.
         tolerance: relative. nominals: magnitudes of the states, shape (n,), by which absolute tolerances follow.
-        method: multistep formula. native: functions in C for `rates` and `roots`; None where there are none.
+        method: multistep formula. native: functions in C for those in Python; None where there are none.
+        jacobian: see `Jacobian`; None for differences.
     """
 
     def __init__(
@@ -115,6 +121,7 @@ class Cvode:
         nominals: np.ndarray,
         method: Method = "bdf",
         native: Native | None = None,
+        jacobian: Jacobian | None = None,
     ) -> None:
         self._library = _libraries()
         self._count, self._root_count, self._method = count, root_count, _NUMBERS[method]
@@ -129,6 +136,7 @@ class Cvode:
         self.absolute = tolerance * nominals
         self._weights, self._views = _WEIGHTS(self._weigh), dict[int, np.ndarray]()
         self._rates, self._roots = _RATES(self._with_arrays(rates)), _RATES(self._with_roots(roots, root_count))
+        self._jacobian = None if jacobian is None else _JACOBIAN(self._with_matrix(jacobian))
         self.native: CExchange | None = None
         if native is not None:
             self._take(*native)
@@ -203,6 +211,17 @@ class Cvode:
             raise SolverError(f"CVODE returned {flag}")
         raise SolverError(WORDS[_Cause(flag)], None if flag in _UNASKED else self._worst(_Cause(flag)))
 
+    @property
+    def has_jacobian(self) -> bool:
+        """Whether the Jacobian is a function; else it follows from differences."""
+        return self._jacobian is not None
+
+    def drop_jacobian(self) -> None:
+        """From now on by differences."""
+        self._jacobian = None
+        if self._memory is not None:
+            self._call("CVodeSetJacFn", None)
+
     def changed_root(self) -> int:
         """Number of the first root function that changed its sign where the last step ended."""
         found = (ctypes.c_int * self._root_count)()
@@ -233,6 +252,8 @@ class Cvode:
         solver = ctypes.c_void_p(library.SUNLinSol_Dense(self._x, matrix, context))
         self._made += [("SUNMatDestroy", matrix), ("SUNLinSolFree", solver)]
         self._call("CVodeSetLinearSolver", solver, matrix)
+        if self._jacobian is not None:
+            self._call("CVodeSetJacFn", self._jacobian)
         self._call("CVodeSetNoInactiveRootWarn")
         if self.native is not None:
             self.native.memory = self._memory
@@ -247,6 +268,9 @@ class Cvode:
         model.step, model.last_order = address(library.CVode), address(library.CVodeGetLastOrder)
         self._rates, self._roots = _RATES(address(functions.exchange_rates)), _RATES(address(functions.exchange_roots))
         self._weights, self.native = _WEIGHTS(address(functions.exchange_weights)), model
+        if self._jacobian is not None:
+            model.columns = address(library.SUNDenseMatrix_Data)
+            self._jacobian = _JACOBIAN(address(functions.exchange_jacobian))
 
     def _vector(self) -> tuple[ctypes.c_void_p, np.ndarray]:
         """A vector of the solver, and its numbers."""
@@ -282,13 +306,25 @@ class Cvode:
         place, array = self._library.N_VGetArrayPointer, self._array
 
         def called(t: float, x: int, written: int, _data: Any) -> int:
-            try:
-                return rates(t, array(place(x)), array(place(written)))
-            except Exception as error:  # nothing may pass through C
-                self._raised = error
-                return -1
+            return self._kept(rates, t, array(place(x)), array(place(written)))
 
         return called
+
+    def _with_matrix(self, jacobian: Jacobian) -> Callable[..., int]:
+        place, array, columns = self._library.N_VGetArrayPointer, self._array, self._library.SUNDenseMatrix_Data
+
+        def called(t: float, x: int, rates: int, matrix: int, *_: Any) -> int:
+            return self._kept(jacobian, t, array(place(x)), array(place(rates)), columns(matrix))
+
+        return called
+
+    def _kept(self, function: Callable[..., int], *arguments: Any) -> int:
+        """What a function says; what it raises is raised once C has returned, through which nothing may pass."""
+        try:
+            return function(*arguments)
+        except Exception as error:
+            self._raised = error
+            return -1
 
     def _with_roots(self, roots: Rates, count: int) -> Callable[..., int]:
         place, array, kind = self._library.N_VGetArrayPointer, self._array, ctypes.c_double * max(count, 1)
@@ -335,7 +371,9 @@ class _Libraries:
         self._handles = [ctypes.CDLL(str(folder / f"{name}{fmpy.sharedLibraryExtension}")) for name in _LIBRARIES]
         for name in ("CVodeCreate", "N_VNew_Serial", "N_VGetArrayPointer", "SUNDenseMatrix", "SUNLinSol_Dense"):
             getattr(self, name).restype = ctypes.c_void_p
-        self.N_VGetArrayPointer.argtypes = [ctypes.c_void_p]
+        self.SUNDenseMatrix_Data.restype = ctypes.c_void_p
+        for read in (self.N_VGetArrayPointer, self.SUNDenseMatrix_Data):
+            read.argtypes = [ctypes.c_void_p]
 
     def __getattr__(self, name: str) -> Any:
         for handle in self._handles:

@@ -11,6 +11,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException, fmi1EventInfo
 from fmpy.fmi2 import fmi2EventInfo
 
+from fmus.exchange.jacobian import DirectionalDerivatives
 from fmus.exchange.native_steps import CExchange, describe_model, load_steps
 from fmus.fmi.native_calls import WARNING
 from fmus.fmi.standard import DISCARD, NEVER
@@ -52,6 +53,7 @@ class ModelCalls:
         slave: fmpy's model, instantiated or not. version: of FMI. counts: of states, and of event indicators.
         functions: of the library by name, as it exports them.
         complete_steps: whether it wants to know of each step that the solver completed.
+        slopes: arguments of its directional derivatives; None where it has none.
     """
 
     def __init__(
@@ -62,11 +64,16 @@ class ModelCalls:
         functions: dict[str, Any],
         *,
         complete_steps: bool,
+        slopes: DirectionalDerivatives | None = None,
     ) -> None:
         self._slave, self._version, self._functions = slave, version, functions
         self.state_count, self.indicator_count = counts
-        self._complete_steps = complete_steps
+        self._complete_steps, self.slopes = complete_steps, slopes
+        self.rate_count = 0
+        """How often derivatives were asked for, beside what C counts."""
         self._names: list[str] = []
+        self.differing: int | None = None
+        """Number of the derivative whose slope was not what a difference gives."""
         self.failed: FMICallException | None = None  # with which the FMU last refused what a solver asked
         self._set_time, self._set_states = self._made("SetTime"), self._made("SetContinuousStates")
         self._get_rates, self._get_indicators = self._made(self._name("rates")), self._made("GetEventIndicators")
@@ -91,7 +98,33 @@ class ModelCalls:
         if not self.state_count:  # a state that stands, so that the solver has one
             written[0] = 0.0
             return 0
+        self.rate_count += 1
         return self._tried(t, x, self._get_rates, written, self.state_count)
+
+    def jacobian(self, t: float, x: Any, rates: Any, columns: int) -> int:
+        """Derivatives of the derivatives by the states, for a solver, by directional derivatives.
+
+        Args:
+            t: instant [s]. x: states. rates: derivatives there.
+            columns: address of the doubles that the matrix goes to, column by column.
+        """
+        slopes, n = self.slopes, self.state_count
+        assert slopes is not None
+        said, get = self._tried(t, x, lambda: 0), self._made("GetDirectionalDerivative")
+        for j in range(n):
+            said = said or self._said(get, get(*slopes.arguments(j, columns + 8 * j * n)))
+        if said:
+            return said
+        room = ctypes.c_double * n
+
+        def rates_at(moved: np.ndarray) -> np.ndarray | None:
+            point, found = room.from_buffer(slopes.scratch), room.from_buffer(slopes.scratch, 8 * n)
+            point[:] = moved.tolist()
+            return None if self.rates(t, point, found) else np.array(found)
+
+        matrix = np.ctypeslib.as_array((room * n).from_address(columns))
+        self.differing = slopes.differing(np.array(x), np.array(rates), matrix, rates_at)
+        return 0 if self.differing is None else -1
 
     def indicators(self, t: float, x: Any, written: Any) -> int:
         """Event indicators likewise.
@@ -116,7 +149,10 @@ class ModelCalls:
         if self.state_count:
             array = (ctypes.c_double * self.state_count).from_address(found.ctypes.data)
             self._done(self._get_nominals, array, self.state_count)
-        return np.where(np.isfinite(found) & (found != 0.0), np.abs(found), 1.0)
+        sizes = np.where(np.isfinite(found) & (found != 0.0), np.abs(found), 1.0)
+        if self.slopes is not None:
+            self.slopes.nominals[:] = sizes.tolist()
+        return sizes
 
     def enter_event_mode(self) -> None:
         """To Event Mode, which FMI 1 does not know."""
@@ -166,9 +202,12 @@ class ModelCalls:
         functions = [self._functions[f"fmi{self._version}{name}"] for name in names]
         if not self._complete_steps:
             functions[-1] = None
+        if self.slopes is not None:
+            names.append("GetDirectionalDerivative")
+            functions.append(self._functions[f"fmi{self._version}{names[-1]}"])
         counts = self.state_count, self.indicator_count
         self._names = names
-        return describe_model(self._slave.component, functions, self._version, counts), library
+        return describe_model(self._slave.component, functions, self._version, counts, self.slopes), library
 
     def after_native(self, model: CExchange, *, refused: bool) -> None:
         """Take over what C met: warnings are counted, and a refusal is kept, or raised outside of the solver.
@@ -183,6 +222,8 @@ class ModelCalls:
             for _ in range(model.warnings[place]):
                 self._slave.warned(f"fmi{self._version}{name}")
             model.warnings[place] = 0
+        if model.differing > 0:
+            self.differing, model.differing = int(model.differing) - 1, 0
         if model.status:
             error = FMICallException(f"fmi{self._version}{self._names[model.place]}", int(model.status))
             model.status = 0
@@ -226,13 +267,17 @@ class ModelCalls:
         if status > WARNING:
             raise FMICallException(call.whole, status)  # type: ignore[attr-defined]
 
-    def _tried(self, t: float, x: Any, get: Callable[..., int], written: Any, count: int) -> int:
+    def _tried(self, t: float, x: Any, get: Callable[..., int], *arguments: Any) -> int:
         """What a solver is to make of a call at an instant [s] and states."""
         call, status = self._set_time, self._set_time(t)
         if status <= WARNING and self.state_count:
             call, status = self._set_states, self._set_states(x, self.state_count)
         if status <= WARNING:
-            call, status = get, get(written, count)
+            call, status = get, get(*arguments)
+        return self._said(call, status)
+
+    def _said(self, call: Callable[..., int], status: int) -> int:
+        """What a solver is to make of a call."""
         if status <= WARNING:
             return 0
         self.failed = FMICallException(call.whole, status)  # type: ignore[attr-defined]

@@ -15,6 +15,7 @@ import numpy as np
 from fmpy.model_description import ModelDescription
 
 from fmus.exchange.cvode import AT_ROOT, Cvode, SolverError
+from fmus.exchange.jacobian import directional_derivatives
 from fmus.exchange.model_calls import EventIteration, ModelCalls
 from fmus.exchange.native_steps import EVENT, GAVE_UP, REFUSED, TERMINATE, TOO_MANY, CExchange, load_steps
 from fmus.fmi.elements import elements_of
@@ -73,7 +74,12 @@ class Motion:
             nominals,
             method,
             model.native(),
+            None if model.slopes is None else model.jacobian,
         )
+        self.jacobian, self.told = "differences" if model.slopes is None else "directional derivatives", False
+        """Where the Jacobian of the solver comes from, in words; whether these tell that directional derivatives are
+        not used.
+        """
         self._x = self.solver.address(self.solver.states)
         self.follower: Part | None = None
         """Called for each internal step; it may `look` at instants within it."""
@@ -99,6 +105,12 @@ class Motion:
         """
         self.in_event_mode, self.terminated, self.next_event = state
         self.begin_anew()
+
+    @property
+    def derivative_calls(self) -> int:
+        """How often the FMU was asked for derivatives."""
+        native = self.solver.native
+        return self._model.rate_count + (0 if native is None else int(native.rates))
 
     # -- events -----------------------------------------------------------------------------------------------------
 
@@ -224,7 +236,7 @@ class Motion:
         try:
             reached, root = solver.step(stop)
         except SolverError as error:
-            raise self._explained(error, t) from error
+            return self._given_up(error, t)
         self._rooted = root
         model.move(reached, self._x)
         if self.follower is not None:
@@ -245,11 +257,26 @@ class Motion:
             try:
                 self.solver.fail(int(native.flag))
             except SolverError as error:
-                raise self._explained(error, native.reached) from error
+                return self._given_up(error, float(native.reached))
         self._model.after_native(native, refused=ended == REFUSED)
         if ended == TOO_MANY:
             raise _too_many(native.reached)
         return _StepEnd(float(native.reached), ended == EVENT, ended == TERMINATE)
+
+    def _given_up(self, error: SolverError, t: float) -> _StepEnd:
+        """Where it stands, to go on by differences where the FMU gave the Jacobian up to now; else raises."""
+        explained, model = self._explained(error, t), self._model
+        if not self.solver.has_jacobian:
+            raise explained from error
+        why = f"with directional derivatives {explained}"
+        if model.slopes is not None and model.differing is not None:
+            rate = model.slopes.rates[model.differing]
+            why = f"the directional derivatives of {rate} are not what differences give behind t = {t:.12g} s"
+        self.jacobian, self.told = f"differences, since {why}", True
+        self.solver.drop_jacobian()
+        model.move(t, self._x)
+        self.begin_anew()
+        return _StepEnd(t, event=False, terminate=False)
 
     def _explained(self, error: SolverError, t: float) -> SolverError:
         """The solver's words with time and state, or those of the FMU where it refused what the solver asked."""
@@ -297,7 +324,8 @@ def motion_of(
     counts = int(description.numberOfContinuousStates or 0), int(description.numberOfEventIndicators or 0)
     if version == 3:
         counts = slave.getNumberOfContinuousStates(), slave.getNumberOfEventIndicators()
-    model = ModelCalls(slave, version, counts, functions, complete_steps=complete)
+    slopes = directional_derivatives(description, counts[0])
+    model = ModelCalls(slave, version, counts, functions, complete_steps=complete, slopes=slopes)
     states = [unknown.variable.derivative for unknown in description.derivatives]
     names = [element.name for state in states if state is not None for element in elements_of(state)]
 

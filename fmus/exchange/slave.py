@@ -103,9 +103,12 @@ class CoSimulationFunctions:
         return kind == fmi2Terminated and self.motion is not None and self.motion.terminated
 
     def summary(self) -> dict[str, Any]:
-        """Which solver it is, and how many steps it has taken since the FMU was initialised."""
-        steps = 0 if self.motion is None else self.motion.solver.steps
-        return {"name": "cvode", "method": self._method, "tolerance": self.tolerance, "steps": steps}
+        """Which solver it is, and what it has taken since the FMU was initialised: steps and calls for derivatives."""
+        said = {"name": "cvode", "method": self._method, "tolerance": self.tolerance}
+        if self.motion is None:
+            return said | {"steps": 0}
+        steps, rates = self.motion.solver.steps, self.motion.derivative_calls
+        return said | {"steps": steps, "derivatives": rates, "jacobian": self.motion.jacobian}
 
     # -- initialisation ---------------------------------------------------------------------------------------------
 

@@ -1,4 +1,5 @@
 /* Internal steps of CVODE over a model exchange FMU: what `cvode.py` and `motion.py` do in Python, without Python between. */
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -10,13 +11,14 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-enum { SET_TIME, SET_STATES, GET_RATES, GET_INDICATORS, COMPLETED, FUNCTIONS };
+enum { SET_TIME, SET_STATES, GET_RATES, GET_INDICATORS, COMPLETED, GET_SLOPES, FUNCTIONS };
 enum { WARNING = 1, DISCARD = 2 };
+#define SHIFT 1e-7
 enum { ONE_STEP = 2, AT_STOP = 1, AT_ROOT = 2, STARTED = 3 };
 enum { REACHED, EVENT, TERMINATE, GAVE_UP, REFUSED, TOO_MANY };
 
 typedef struct {
-    void *functions[FUNCTIONS]; /* of the FMU; the last one NULL where it need not be told of completed steps */
+    void *functions[FUNCTIONS]; /* of the FMU; COMPLETED is NULL where it need not be told of completed steps */
     void *instance;
     int64_t version, states, indicators;
     double *(*array)(void *vector);
@@ -27,11 +29,19 @@ typedef struct {
     const double *absolute;
     double tolerance, share, reached; /* `reached`: where it stands [s] */
     int64_t steps, flag, status, place; /* what CVODE said last; what the FMU refused with, and which function did */
+    int64_t rates; /* how often derivatives were asked for */
+    const uint32_t *unknowns, *knowns; /* value references of the derivatives, and of what each state is an element of */
+    const int64_t *sizes, *places; /* of each state: size of the array that it stands in, and where */
+    double *seed, *(*columns)(void *matrix); /* `seed`: zeros, as many as the largest array has elements */
+    double *nominals, *scratch; /* magnitudes of the states; room for states and derivatives */
+    int64_t unknown_count, differing; /* number of the derivative whose slope is not what a difference gives, from 1 */
     int64_t warnings[FUNCTIONS];
 } Exchange;
 
 typedef int (*SetTime)(void *, double);
 typedef int (*Transfer)(void *, double *, size_t);
+typedef int (*Slopes2)(void *, const uint32_t *, size_t, const uint32_t *, size_t, const double *, double *);
+typedef int (*Slopes3)(void *, const uint32_t *, size_t, const uint32_t *, size_t, const double *, size_t, double *, size_t);
 typedef int (*Completed1)(void *, char *);
 typedef int (*Completed2)(void *, int, int *, int *);
 typedef int (*Completed3)(void *, bool, bool *, bool *);
@@ -64,12 +74,79 @@ EXPORT int exchange_rates(double t, void *x, void *written, void *data) {
         e->array(written)[0] = 0.0;
         return 0;
     }
+    e->rates++;
     return said(e, move(e, t, e->array(x)) && transfer(e, GET_RATES, e->array(written), e->states));
 }
 
 EXPORT int exchange_roots(double t, void *x, double *written, void *data) {
     Exchange *e = data;
     return said(e, move(e, t, e->array(x)) && transfer(e, GET_INDICATORS, written, e->indicators));
+}
+
+/* Of a state in the direction of a difference. */
+static double length(const Exchange *e, const double *x, int64_t j) {
+    return (0.5 + fmod(0.6180339887498949 * (double)j, 1.0)) * (fabs(x[j]) + e->nominals[j]);
+}
+
+/* Differences of the derivatives in that direction, or against it; false where the FMU refused. */
+static bool differences(Exchange *e, double t, const double *x, const double *rates, double shift, double *slopes) {
+    double *point = e->scratch;
+    for (int64_t j = 0; j < e->states; j++)
+        point[j] = x[j] + shift * length(e, x, j);
+    e->rates++;
+    if (!move(e, t, point) || !transfer(e, GET_RATES, slopes, e->states))
+        return false;
+    for (int64_t i = 0; i < e->states; i++)
+        slopes[i] = (slopes[i] - rates[i]) / shift;
+    return true;
+}
+
+/* Number of the first derivative whose slope in that direction lies outside of differences, from 1; 0 where none does. */
+static int64_t outside(Exchange *e, const double *x, const double *rates, const double *columns, const double *one, const double *other) {
+    const double shift = SHIFT, share = 0.1, rounding = 1e3 * DBL_EPSILON;
+    int64_t n = e->states;
+    for (int64_t i = 0; i < n; i++) {
+        double slope = 0.0, size = 0.0, low = fmin(one[i], other[i]), high = fmax(one[i], other[i]);
+        for (int64_t j = 0; j < n; j++) {
+            slope += length(e, x, j) * columns[j * n + i];
+            size += length(e, x, j) * fabs(columns[j * n + i]);
+        }
+        double most = share * size + rounding * (2.0 * fabs(rates[i]) + shift * fmax(fabs(low), fabs(high))) / shift;
+        if (!(slope >= low - most && slope <= high + most))
+            return i + 1;
+    }
+    return 0;
+}
+
+/* The same of the Jacobian at x: the difference in one direction, and that in the other where the first one says no, for
+   between both lies any slope at a kink, and what bends goes to both sides. -1 where the FMU refused. */
+static int64_t differing(Exchange *e, double t, const double *x, const double *rates, const double *columns) {
+    double *ahead = e->scratch + e->states, *back = ahead + e->states;
+    if (!differences(e, t, x, rates, SHIFT, ahead))
+        return -1;
+    if (outside(e, x, rates, columns, ahead, ahead) == 0)
+        return 0;
+    return differences(e, t, x, rates, -SHIFT, back) ? outside(e, x, rates, columns, ahead, back) : -1;
+}
+
+/* The Jacobian by directional derivatives, column by column. */
+EXPORT int exchange_jacobian(double t, void *x, void *fx, void *matrix, void *data, void *a, void *b, void *c) {
+    Exchange *e = data;
+    (void)a, (void)b, (void)c;
+    bool fine = move(e, t, e->array(x));
+    double *all = e->columns(matrix), *column = all;
+    for (int64_t j = 0; fine && j < e->states; j++, column += e->states) {
+        void *function = e->functions[GET_SLOPES];
+        size_t unknowns = (size_t)e->unknown_count, size = (size_t)e->sizes[j];
+        e->seed[e->places[j]] = 1.0;
+        fine = done(e, GET_SLOPES,
+                    e->version == 2
+                        ? ((Slopes2)function)(e->instance, e->unknowns, unknowns, e->knowns + j, 1, e->seed, column)
+                        : ((Slopes3)function)(e->instance, e->unknowns, unknowns, e->knowns + j, 1, e->seed, size, column, (size_t)e->states));
+        e->seed[e->places[j]] = 0.0;
+    }
+    e->differing = fine ? differing(e, t, e->array(x), e->array(fx), all) : 0;
+    return e->differing > 0 ? -1 : said(e, fine && e->differing == 0);
 }
 
 EXPORT int exchange_weights(void *x, void *weights, void *data) {

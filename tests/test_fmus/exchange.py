@@ -11,7 +11,9 @@ from fmus.toolchain.compile import library_name
 from fmus.toolchain.platforms import host_platform
 
 STATES = {"DECAY": 1, "BALL": 2, "TRAIN": 2, "STAIR": 0, "STEPS": 1, "CHATTERS": 0, "UNSETTLED": 0, "ESCAPES": 2}
-STATES |= {"REFUSES": 1}
+STATES |= {"REFUSES": 1, "OSCILLATES": 2, "REACTION": 2}
+SLOPES = ("OSCILLATES", "REACTION")
+"""Those that have directional derivatives."""
 INDICATORS = {"BALL": 1}
 NAMES = ("position", "speed")
 COUNT = (
@@ -24,15 +26,18 @@ UNITS = (
 )
 
 
-def exchange_fmu(folder: Path, model: str, version: int = 2, *, saves: bool = True, units: bool = False) -> Path:
+def exchange_fmu(
+    folder: Path, model: str, version: int = 2, *, saves: bool = True, units: bool = False, lie: str = ""
+) -> Path:
     """A model exchange FMU.
 
     Args:
         folder: where it goes. model: a MODEL_... macro without the prefix. version: of FMI.
         saves: whether it declares that its state can be saved. units: whether its variables have units.
+        lie: a LIE_... macro without the prefix.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    library = compiled("exchange.c", f"#define VERSION {version}\n#define MODEL_{model}\n", "fmu")
+    library = compiled("exchange.c", f"#define VERSION {version}\n#define MODEL_{model}\n#define LIE_{lie}\n", "fmu")
     platform = host_platform()
     content = {
         "modelDescription.xml": _DESCRIPTIONS[version](model, saves, units).encode(),
@@ -78,7 +83,8 @@ def _second(model: str, saves: bool, units: bool) -> str:
     read = "".join(f'<Unknown index="{i + 1}"/>' for i in range(n))
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="{model}" guid="1" numberOfEventIndicators="{INDICATORS.get(model, 0)}">
-  <ModelExchange modelIdentifier="fmu" canGetAndSetFMUstate="{str(saves).lower()}"/>{UNITS if units else ""}
+  <ModelExchange modelIdentifier="fmu" canGetAndSetFMUstate="{str(saves).lower()}"
+    providesDirectionalDerivative="{str(model in SLOPES).lower()}"/>{UNITS if units else ""}
   <DefaultExperiment startTime="0" stopTime="3"/>
   <ModelVariables>{outputs}
     <ScalarVariable name="input" valueReference="3" causality="input"><Real start="0"/></ScalarVariable>
@@ -102,7 +108,8 @@ def _third(model: str, saves: bool, units: bool) -> str:
     indicators = '<EventIndicator valueReference="1"/>' if model in INDICATORS else ""
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="{model}" instantiationToken="1">
-  <ModelExchange modelIdentifier="fmu" canGetAndSetFMUState="{str(saves).lower()}" needsCompletedIntegratorStep="true"/>
+  <ModelExchange modelIdentifier="fmu" canGetAndSetFMUState="{str(saves).lower()}" needsCompletedIntegratorStep="true"
+    providesDirectionalDerivatives="{str(model in SLOPES).lower()}"/>
   {UNITS if units else ""}
   <DefaultExperiment startTime="0" stopTime="3"/>
   <ModelVariables><Float64 name="time" valueReference="99" causality="independent" variability="continuous"/>{outputs}

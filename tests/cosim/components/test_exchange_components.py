@@ -6,56 +6,17 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from test_fmus.exchange import exchange_fmu
+from test_fmus.stepped import Stepped
 
-from cosim.components.component import Component
 from cosim.components.loading import load_fmu
 from cosim.errors import FmuLoadError, RunError
 from fmus.exchange.model_calls import ModelCalls
 
 VERSIONS = (1, 2, 3)
-FINE = 1e-10
-
-
-class Stepped:
-    """An FMU that is initialised, its input and its outputs.
-
-    Args:
-        path: of the FMU. tolerance: of the solver.
-    """
-
-    def __init__(self, path: Path, tolerance: float | None = FINE, start: float = 0.0, value: float = 0.0) -> None:
-        self.component: Component = load_fmu(path, "plant", tolerance)
-        self.component.instantiate()
-        self.component.enter_initialization(start, start + 100.0)
-        self.names = self.component.names("output")
-        self.outputs = np.zeros(len(self.names))
-        self._write, self.input = self.component.writer(["input"])
-        self.input[0] = value
-        self._write()
-        self.component.exit_initialization()
-        self._read = self.component.reader(self.names, self.outputs)
-        self._read()
-        self.time = start
-
-    def to(self, until: float, value: float | None = None) -> np.ndarray:
-        """Step to an instant [s] under an input; outputs there."""
-        if value is not None:
-            self.input[0] = value
-            self._write()
-        self.component.advance(self.time, until)
-        self._read()
-        self.time = until
-        return self.outputs.copy()
-
-    def free(self) -> None:
-        """Free the instance."""
-        self.component.terminate()
-        self.component.free()
 
 
 @pytest.fixture(scope="module")
@@ -218,7 +179,9 @@ def test_the_tolerance_is_that_of_the_solver(folder: Path, method: str) -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("model", ["DECAY", "BALL", "STAIR", "STEPS", "TRAIN", "ESCAPES", "REFUSES"])
+@pytest.mark.parametrize(
+    "model", ["DECAY", "BALL", "STAIR", "STEPS", "TRAIN", "ESCAPES", "REFUSES", "OSCILLATES", "REACTION"]
+)
 def test_steps_of_the_solver_in_c_give_the_bits_and_words_of_those_in_python(
     folder: Path, monkeypatch: pytest.MonkeyPatch, model: str, version: int
 ) -> None:

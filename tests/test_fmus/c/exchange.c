@@ -90,6 +90,48 @@ static int rates(Model *m, double *dx) { dx[0] = 0.0; dx[1] = m->x[1] * m->x[1];
 static void indicate(Model *m, double *z) {}
 static bool iterate(Model *m) { return false; }
 
+#elif defined(MODEL_OSCILLATES) /* van der Pol, stiff: x'' = 1000 (1 - x^2) x' - x */
+#define STATES 2
+#define INDICATORS 0
+static void start(Model *m) { m->x[0] = 2.0; m->x[1] = 0.0; }
+static int rates(Model *m, double *dx) {
+    dx[0] = m->x[1];
+    dx[1] = 1e3 * (1.0 - m->x[0] * m->x[0]) * m->x[1] - m->x[0];
+    return 0;
+}
+#define SLOPES
+static double slope(Model *m, unsigned rate, unsigned state) {
+    if (rate == 4) return state == 2;
+    double exact = state == 1 ? -2e3 * m->x[0] * m->x[1] - 1.0 : 1e3 * (1.0 - m->x[0] * m->x[0]);
+#if defined(LIE_ALWAYS)
+    return -exact;
+#elif defined(LIE_LATER)
+    return m->t > 0.5 ? 1e9 * exact : exact;
+#else
+    return exact;
+#endif
+}
+static void indicate(Model *m, double *z) {}
+static bool iterate(Model *m) { return false; }
+
+#elif defined(MODEL_REACTION) /* Robertson: slow, very fast and fast; the third is what the other two leave of one */
+#define STATES 2
+#define INDICATORS 0
+static void start(Model *m) { m->x[0] = 1.0; m->x[1] = 0.0; }
+static int rates(Model *m, double *dx) {
+    double a = m->x[0], b = m->x[1];
+    dx[0] = -0.04 * a + 1e4 * b * (1.0 - a - b);
+    dx[1] = -dx[0] - 3e7 * b * b;
+    return 0;
+}
+#define SLOPES
+static double slope(Model *m, unsigned rate, unsigned state) {
+    double a = m->x[0], b = m->x[1], first = state == 1 ? -0.04 - 1e4 * b : 1e4 * (1.0 - a - 2.0 * b);
+    return rate == 4 ? first : -first - (state == 2 ? 6e7 * b : 0.0);
+}
+static void indicate(Model *m, double *z) {}
+static bool iterate(Model *m) { return false; }
+
 #else /* MODEL_REFUSES: its derivatives are an error from 0.5 s on */
 #define STATES 1
 #define INDICATORS 0
@@ -135,6 +177,18 @@ static int set_reals(Model *m, const unsigned *vr, size_t n, const double *value
 static int copy(double *to, const double *from, size_t n) {
     for (size_t i = 0; i < n; i++) to[i] = from[i];
     return 0;
+}
+
+static int slopes(Model *m, const unsigned *rate, size_t n, const unsigned *state, size_t k, const double *seed, double *out) {
+#if defined(SLOPES)
+    for (size_t i = 0; i < n; i++) {
+        out[i] = 0.0;
+        for (size_t j = 0; j < k; j++) out[i] += seed[j] * slope(m, rate[i], state[j]);
+    }
+    return 0;
+#else
+    return 3;
+#endif
 }
 
 static int ones(double *x, size_t n) {
@@ -215,7 +269,10 @@ int F(SetReal)(Model *m, const unsigned *vr, size_t n, const double *v) { return
 int F(GetInteger)(Model *m, const unsigned *vr, size_t n, int *v) { for (size_t i = 0; i < n; i++) v[i] = m->count; return 0; }
 REFUSED(F(SetInteger), Model *m) REFUSED(F(GetBoolean), Model *m) REFUSED(F(SetBoolean), Model *m)
 REFUSED(F(GetString), Model *m) REFUSED(F(SetString), Model *m) REFUSED(F(SerializedFMUstateSize), Model *m)
-REFUSED(F(SerializeFMUstate), Model *m) REFUSED(F(DeSerializeFMUstate), Model *m) REFUSED(F(GetDirectionalDerivative), Model *m)
+REFUSED(F(SerializeFMUstate), Model *m) REFUSED(F(DeSerializeFMUstate), Model *m)
+int F(GetDirectionalDerivative)(Model *m, const unsigned *rate, size_t n, const unsigned *state, size_t k, const double *seed, double *out) {
+    return slopes(m, rate, n, state, k, seed, out);
+}
 
 #else
 #define F(name) fmi3##name
@@ -254,7 +311,11 @@ PAIR(Float32) PAIR(Int8) PAIR(UInt8) PAIR(Int16) PAIR(UInt16) PAIR(UInt32) PAIR(
 PAIR(Binary) PAIR(Clock) PAIR(IntervalDecimal) PAIR(IntervalFraction) PAIR(ShiftDecimal) PAIR(ShiftFraction)
 REFUSED(F(SetInt32), Model *m) REFUSED(F(GetNumberOfVariableDependencies), Model *m) REFUSED(F(GetVariableDependencies), Model *m)
 REFUSED(F(SerializedFMUStateSize), Model *m) REFUSED(F(SerializeFMUState), Model *m) REFUSED(F(DeserializeFMUState), Model *m)
-REFUSED(F(GetDirectionalDerivative), Model *m) REFUSED(F(GetAdjointDerivative), Model *m)
+int F(GetDirectionalDerivative)(Model *m, const unsigned *rate, size_t n, const unsigned *state, size_t k, const double *seed,
+                               size_t seeds, double *out, size_t outs) {
+    return slopes(m, rate, n, state, k, seed, out);
+}
+REFUSED(F(GetAdjointDerivative), Model *m)
 REFUSED(F(EnterConfigurationMode), Model *m) REFUSED(F(ExitConfigurationMode), Model *m) REFUSED(F(EvaluateDiscreteStates), Model *m)
 REFUSED(F(EnterStepMode), Model *m) REFUSED(F(GetOutputDerivatives), Model *m) REFUSED(F(DoStep), Model *m)
 REFUSED(F(ActivateModelPartition), Model *m)
