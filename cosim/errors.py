@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 
 ALIKE = 0.65
 """Share of letters, as difflib counts them, from which on two names are near: below it, a hint leads astray."""
@@ -42,6 +43,16 @@ class BaselineError(CosimError, ValueError):
 
 class ProvenanceError(CosimError, ValueError):
     """A results folder does not say how it was made, or its files are not those any more."""
+
+
+class UntrustedError(ProvenanceError):
+    """Results would run code that was never run here.
+
+    Attributes:
+        files: of that code.
+    """
+
+    files: tuple[Path, ...] = ()
 
 
 class CertificateError(CosimError, ValueError):

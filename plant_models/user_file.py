@@ -14,6 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from plant_models.code_trust import WHY_NOT, is_looking, remember
 from plant_models.explained_error import explained
 from plant_models.local_files import files_digest, local_files
 from plant_models.registry import load, unwritten
@@ -24,6 +25,10 @@ _neighbours: dict[str, tuple[ModuleType, str]] = {}
 
 class UserFileError(ValueError):
     """A name that gives no class as expected; the message says what was found and what was expected."""
+
+
+class CodeNotRunError(UserFileError):
+    """A class of a file or a module is asked for where nothing is run, see `plant_models.code_trust.looking`."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,10 @@ def load_class(name: str, expected: Expected, folder: Path | str = ".") -> Any:
 
     Raises:
         UserFileError: there is no such file, module or class, it fails while it is run, or the class is something else.
+        CodeNotRunError: nothing is run.
     """
+    if is_looking():
+        raise CodeNotRunError(f"{name} {WHY_NOT}.")
     if not names_a_file(name):
         found = _imported(name)
         if not expected.accepts(found):
@@ -203,6 +211,7 @@ def _run(path: Path) -> ModuleType:
     if name in sys.modules:
         return sys.modules[name]
     _forget_neighbours(local_files(path))
+    remember([path, *local_files(path).values()])
     module = sys.modules[name] = ModuleType(name)  # known before it runs, as dataclasses want
     module.__file__ = str(path)
     kept, flag = list(sys.path), sys.dont_write_bytecode

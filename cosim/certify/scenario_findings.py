@@ -41,11 +41,11 @@ def scenario_observers(task: RunTask, demands: Demands) -> Iterator[Certified]:
 def _gaps(task: RunTask) -> dict[str, ExpectedGap]:
     table, where = task.table, task.where
     span = table.start, table.stop
+    links, layout = parse_connections(table.connections, where), None
     components = {
-        name: describe_component(name, one, task.folder, f"{where}: components.{name}", span)
+        name: describe_component(name, one, task.folder, f"{where}: components.{name}", span, links)
         for name, one in table.components.items()
     }
-    links, layout = parse_connections(table.connections, where), None
     coupled, roles = couple(task, links, components), balise_roles(table.balises, components, where)
     if table.balises is not None:
         layout = make_layout(table.balises, table.start, table.stop, task.folder, where)

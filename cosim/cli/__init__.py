@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+from cosim.cli.trust_question import trusted_now
 from cosim.errors import CosimError
 from cosim.process.interruption import ends_like_ctrl_c
 from cosim.process.watch import can_watch, watched
@@ -46,6 +47,7 @@ PROGRAM = CommandProgram(
     (CosimError,),
     ends_like_ctrl_c,
     lambda error, _: str(error),
+    trusted_now,
 )
 
 

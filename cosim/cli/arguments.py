@@ -120,14 +120,24 @@ def settings_argument(text: str = OVERRIDES) -> Argument:
     return argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="settings", help=text)
 
 
-def scenario_arguments(default: str | None = _DEFAULT_SCENARIO) -> tuple[Argument, Argument]:
-    """The arguments ``SCENARIO`` and ``--set``.
+TRUST_RESULTS = argument(
+    "--trust", action="store_true", help="of a results folder: run code that it names and that was never run here"
+)
+TRUST_CODE = argument(
+    "--trust", action="store_true", help="run the Python files that a scenario names, to look into them too"
+)
+
+
+def scenario_arguments(
+    default: str | None = _DEFAULT_SCENARIO, trust: Argument = TRUST_RESULTS
+) -> tuple[Argument, Argument, Argument]:
+    """The arguments ``SCENARIO``, ``--set`` and ``--trust``.
 
     Args:
-        default: the scenario where none is given; None where one must be.
+        default: the scenario where none is given; None where one must be. trust: what the last one means.
     """
     what = "name of a shipped scenario, or a file (.toml or .ssp)"
     if default is None:
-        return argument("scenario", help=what), settings_argument()
+        return argument("scenario", help=what), settings_argument(), trust
     optional = argument("scenario", nargs="?", default=default, help=f"{what} (default: {default})")
-    return optional, settings_argument()
+    return optional, settings_argument(), trust

@@ -300,14 +300,17 @@ def _action(
     text: str,
     arguments: Sequence[Argument | ArgumentGroup],
     codes: str = "0 done, 2 error",
+    *,
+    looks: bool = False,
 ) -> Action:
     words = {"help": text, "description": f"{text[0].upper()}{text[1:]}.", "epilog": f"Exit codes: {codes}."}
-    return Action(name, execute, words, (QUIET, *arguments))
+    return Action(name, execute, words, (QUIET, *arguments), looks)
 
 
 GROUP = "Compare"
 PLACE = 4
 HELP = "make, check and update baselines"
+LOOKS = False
 EXAMPLES = (
     "cosim baseline make vendor.toml vendor.json",
     "cosim baseline make vendor.fmu vendor.json --stop 60 --step 0.01",
@@ -324,10 +327,12 @@ ARGUMENTS = (
         (
             _action("make", _make, "run an FMU or a scenario and keep its outputs", _MAKE),
             _action("check", _check, "run again, or take a given result, and compare", CHECK, CODES),
-            _action("show", _show, "show what a baseline is of", (FILE,)),
+            _action("show", _show, "show what a baseline is of", (FILE,), looks=True),
             _action("update", _update, "run again and accept the outputs as they are now", (FILE, ALLOWED)),
-            _action("embed", _embed, "write a copy of an FMU that holds the baseline (FMI-LS-REF)", _EMBED),
-            _action("extract", _extract, "take a reference (FMI-LS-REF) out of an FMU as a baseline", _EXTRACT),
+            _action("embed", _embed, "write a copy of an FMU that holds the baseline (FMI-LS-REF)", _EMBED, looks=True),
+            _action(
+                "extract", _extract, "take a reference (FMI-LS-REF) out of an FMU as a baseline", _EXTRACT, looks=True
+            ),
         )
     ),
 )

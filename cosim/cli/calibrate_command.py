@@ -16,7 +16,7 @@ from cosim.calibration.fmu_runs import CALL_TIMEOUT, FmuRuns
 from cosim.calibration.recorded_signals import CalibrationError, Selection, sort_columns
 from cosim.calibration.running_resistance import RunningResistance
 from cosim.calibration.runs import Runs
-from cosim.cli.arguments import MANY_RUNS, PARAMETERS_FILE, positive_number, settings_argument
+from cosim.cli.arguments import MANY_RUNS, PARAMETERS_FILE, TRUST_RESULTS, positive_number, settings_argument
 from cosim.cli.output import save_figure, write_text
 from cosim.cli.scenarios import between_samples, parse_setting, setting_number
 from cosim.errors import CosimError, ScenarioError, nearest
@@ -36,6 +36,7 @@ _RUN_SECONDS, _RUN_STEP = 60.0, 0.05
 GROUP = "Study"
 PLACE = 3
 HELP = "fit parameters of an FMU, a train model or a scenario to a recording"
+LOOKS = False
 FORMER = {
     "identify": "cosim calibrate running_resistance RECORDING, with --signals speed=NAME for --speed NAME, --inputs "
     "effort=N_OR_NAME for --effort, --set mass=KG for --mass, --set minimum_speed=M_S and --set resolution=M_S2 for "
@@ -90,6 +91,7 @@ ARGUMENTS = (
         help="standard deviations in the units of the model (default: from the residuals)",
     ),
     settings_argument("not fitted"),
+    TRUST_RESULTS,
     argument("--from", type=float, default=-inf, dest="begin", metavar="SECONDS", help="begin of the part to use"),
     argument("--to", type=float, default=inf, dest="end", metavar="SECONDS", help="end of the part to use"),
     argument(
@@ -209,7 +211,7 @@ def _runs(options: argparse.Namespace, inputs: Mapping[str, Any]) -> Runs:
     where = {"workers": options.workers, "scheduler": options.scheduler, "journal": journal}
     if str(options.model).lower().endswith(".fmu") or options.model in PLANTS:
         return _fmu_runs(options, names, guesses, where)
-    scenario = cosim.Scenario.load(options.model)
+    scenario = cosim.Scenario.load(options.model, trust=options.trust)
     for name, value in map(parse_setting, options.settings):
         scenario.set(name, value)
     if options.call_timeout is not None:

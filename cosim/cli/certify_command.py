@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.certify import Certified, Demands, certified, findings_table, scenario_observers, simulated
-from cosim.cli.arguments import number_from_zero, positive_number, settings_argument
+from cosim.cli.arguments import TRUST_CODE, number_from_zero, positive_number, settings_argument
 from cosim.cli.model_info import declared_model, in_own_words
 from cosim.cli.scenarios import load_scenario, read_setting
 from cosim.errors import CosimError
@@ -31,6 +31,7 @@ _KINDS = ("sufficient", "exact")
 GROUP = "Observers"
 PLACE = 2
 HELP = "gaps, delays and errors for which observers are certified"
+LOOKS = True
 FORMER = {"bound": "cosim certify OBSERVER --error M_S --missing N", "limits": "cosim certify OBSERVER"}
 EXAMPLES = (
     "cosim certify takagi_sugeno_cdo",
@@ -52,6 +53,7 @@ ARGUMENTS = (
     settings_argument(
         "a parameter, for instance --set theta=5 or --set 'gain=[3.4, -3.4, -1.5]'; of a scenario any key"
     ),
+    TRUST_CODE,
     repeated("--option", "NAME=VALUE", "an option, for instance --option nodes=2"),
     argument("--gap", type=positive_number, metavar="S", help="certify any mixture of gaps up to this [s]"),
     argument("--period", type=positive_number, metavar="S", help="certify this constant gap [s]"),
@@ -127,7 +129,7 @@ def _of_gains(table: ComponentTable, options: argparse.Namespace, demands: Deman
 
 
 def _of_scenario(options: argparse.Namespace, demands: Demands) -> list[Certified]:
-    scenario = load_scenario(argparse.Namespace(scenario=options.what, settings=options.settings))
+    scenario = load_scenario(argparse.Namespace(scenario=options.what, settings=options.settings, trust=options.trust))
     task = RunTask(with_seeds(scenario.table()), scenario.name, scenario.folder, scenario.where)
     found = list(scenario_observers(task, demands))
     if not found:

@@ -14,7 +14,7 @@ from cosim.choice.choice import INTERRUPTED, Choice
 from cosim.choice.choose import FURTHER, SEEDS, choose, scenario_for_fmu
 from cosim.choice.replayed_run import replayed
 from cosim.choice.trial import Trial
-from cosim.cli.arguments import FIGURE_FILES, QUIET, positive, settings_argument
+from cosim.cli.arguments import FIGURE_FILES, QUIET, TRUST_RESULTS, positive, settings_argument
 from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import load_scenario
 from cosim.errors import OutputError, RunError, ScenarioError
@@ -39,6 +39,7 @@ def _names(text: str) -> list[str]:
 GROUP = "Observers"
 PLACE = 1
 HELP = "which observer to use beside a train, how good it is, and why not the others"
+LOOKS = False
 FORMER = {"benchmark-observers": "cosim choose SCENARIO"}
 EXAMPLES = (
     "cosim choose vendor.fmu",
@@ -59,6 +60,7 @@ PARSER = {
 ARGUMENTS = (
     argument("scenario", metavar="SCENARIO|FMU", help="a shipped scenario, a file (.toml or .ssp), or a plant (.fmu)"),
     settings_argument(),
+    TRUST_RESULTS,
     argument(
         "--observers",
         type=_names,

@@ -43,6 +43,7 @@ KINDS = "a results folder, a table (CSV, MAT, ...) or a baseline (JSON)"
 GROUP = "Compare"
 PLACE = 1
 HELP = "compare a result with a reference"
+LOOKS = True
 EXAMPLES = (
     "cosim compare results/old results/new",
     "cosim compare baseline.json results/new --html difference.html",

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from cosim.cli.arguments import settings_argument
+from cosim.cli.arguments import TRUST_CODE, settings_argument
 from cosim.cli.scenarios import load_scenario
 from cosim.cli.trajectory import TRAJECTORY, export_trajectory, idle_words
 from cosim.errors import OutputError, ScenarioError
@@ -22,6 +22,7 @@ from fmus.cli.output import Output
 GROUP = "Models and files"
 PLACE = 4
 HELP = "write a scenario as SSP, a result in another format, the trajectory behind a recording"
+LOOKS = True
 FORMER = {"convert": "cosim export SOURCE TARGET", "reference": "cosim export SOURCE TARGET --trajectory"}
 EXAMPLES = (
     "cosim export vendor.toml vendor.ssp",
@@ -42,6 +43,7 @@ ARGUMENTS = (
     ArgumentGroup(
         (
             settings_argument(),
+            TRUST_CODE,
             argument("--ssp-version", choices=("1.0", "2.0"), help="version of SSP (default: 2.0)"),
         ),
         "a scenario",

@@ -21,6 +21,7 @@ from plant_models.user_file import names_a_file, names_code
 GROUP = "Models and files"
 PLACE = 2
 HELP = "describe an FMU, an SSP file, a plant or an observer"
+LOOKS = True
 EXAMPLES = (
     "cosim info vendor.fmu",
     "cosim info quasi_lpv_uio",

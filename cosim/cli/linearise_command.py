@@ -27,6 +27,7 @@ from plant_models.user_file import names_code
 GROUP = "Models and files"
 PLACE = 5
 HELP = "linearise an FMU or a model at a point"
+LOOKS = False
 EXAMPLES = (
     "cosim linearise locomotive",
     "cosim linearise vendor.fmu",

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim import ssp, starter
+from cosim.cli.arguments import TRUST_CODE
 from cosim.errors import ScenarioError
 from cosim.scenario.package_names import is_package
 from cosim.scenario.shipped import shipped_scenarios, shipped_tables
@@ -30,6 +31,7 @@ ALL = "all"
 GROUP = "Models and files"
 PLACE = 1
 HELP = "list scenarios, plants and observers; those that hold a word; those that fit an FMU"
+LOOKS = True
 EXAMPLES = (
     "cosim list",
     "cosim list observers",
@@ -56,6 +58,7 @@ ARGUMENTS = (
         type=Path,
         help="observers whose inputs this FMU (.fmu) or scenario (.toml, .ssp) can give",
     ),
+    TRUST_CODE,
 )
 
 

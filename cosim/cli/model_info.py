@@ -14,6 +14,7 @@ from fmu_observer import OBSERVERS
 from fmus.near_files import what_it_is
 from fmus.recipes import legal_values
 from plant_models import PLANTS
+from plant_models.code_trust import looking
 from plant_models.explained_error import explained
 from plant_models.hybrid import Signal, TracingError
 from plant_models.user_file import names_code
@@ -43,7 +44,8 @@ def declared_model(
             expected = " or ".join(_ARTICLES[kind] for kind in kinds)
             raise ScenarioError(f"{name} is {is_what}; expected the name of {expected}, or file.py:Class.")
         raise ScenarioError(f"There is no {' or '.join(kinds)} {name!r}; {nearest(name, known)}")
-    return make_declared(ComponentTable.model_validate({key: name, "options": options or {}}), where)
+    with looking(False):  # a class that is named on the command line is run as any Python file that is
+        return make_declared(ComponentTable.model_validate({key: name, "options": options or {}}), where)
 
 
 @contextmanager

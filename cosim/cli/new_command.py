@@ -13,6 +13,7 @@ from fmus.cli.output import Output
 GROUP = "Models and files"
 PLACE = 3
 HELP = "write a starter scenario for an FMU"
+LOOKS = False
 EXAMPLES = (
     "cosim new vendor.fmu",
     "cosim new vendor.fmu --observer quasi_lpv_uio -o trial.toml",

@@ -21,6 +21,7 @@ PAGES = (REPORT, "index.html", "tuning.html", "comparison.html", "observers.html
 GROUP = "Compare"
 PLACE = 3
 HELP = "open the page of results in a browser"
+LOOKS = True
 EXAMPLES = (
     "cosim open results/vendor",
     "cosim open measured.csv",

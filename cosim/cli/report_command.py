@@ -30,6 +30,7 @@ MOST_SIGNALS = 16  # panels that a page opens with
 GROUP = "Compare"
 PLACE = 2
 HELP = "report of results, or of several laid over each other"
+LOOKS = True
 EXAMPLES = (
     "cosim report results/vendor",
     "cosim report results/dry results/wet",

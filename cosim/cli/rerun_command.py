@@ -34,6 +34,7 @@ def _share(text: str) -> float:
 GROUP = "Run"
 PLACE = 3
 HELP = "run results again and compare"
+LOOKS = False
 EXAMPLES = (
     "cosim rerun results/vendor",
     "cosim rerun results/vendor --set plant.mass=82e3",
@@ -49,7 +50,11 @@ ARGUMENTS = (
         metavar="SHARE",
         help="how far a signal may differ, as a share of its range (default: 1e-4)",
     ),
-    argument("--trust", action="store_true", help="go on where files of the folder were edited since"),
+    argument(
+        "--trust",
+        action="store_true",
+        help="go on where files of the folder were edited since, or are code that was never run here",
+    ),
     QUIET,
 )
 

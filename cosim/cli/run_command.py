@@ -48,6 +48,7 @@ SEEDS = "seeds"
 GROUP = "Run"
 PLACE = 1
 HELP = "run a scenario"
+LOOKS = False
 EXAMPLES = (
     "cosim run freight_profile_d",
     "cosim run vendor.toml --out results/today",

@@ -25,7 +25,9 @@ def load_scenario(options: argparse.Namespace, loaded: Scenario | None = None) -
     Raises:
         ScenarioError: there is none, or an override is not ``NAME=VALUE``.
     """
-    scenario = loaded or Scenario.load(options.scenario, strict=getattr(options, "strict", False))
+    scenario = loaded or Scenario.load(
+        options.scenario, strict=getattr(options, "strict", False), trust=getattr(options, "trust", False)
+    )
     stated = [parse_setting(setting) for setting in options.settings]
     # what is said by name wins over a case
     return scenario.with_settings(dict(sorted(stated, key=lambda entry: entry[0] != CASE)))

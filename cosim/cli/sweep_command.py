@@ -38,6 +38,7 @@ a range, with --samples"""  # noqa: E501
 GROUP = "Study"
 PLACE = 1
 HELP = "run a scenario with varied values"
+LOOKS = False
 EXAMPLES = (
     "cosim sweep vendor.toml --vary plant.mass=70e3,80e3,90e3",
     "cosim sweep vendor.toml --vary seed=0:20 --workers 4 --out results/seeds",

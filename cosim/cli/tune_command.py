@@ -43,6 +43,7 @@ def _seeds(text: str) -> list[int]:
 GROUP = "Study"
 PLACE = 2
 HELP = "search parameters for the smallest cost over several seeds"
+LOOKS = False
 FORMER_OPTIONS = {"--judge": "--validate"}
 EXAMPLES = ("cosim tune vendor.toml --observer observer --parameters theta=0.5:5:log",)
 PARSER = {

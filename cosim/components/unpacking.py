@@ -17,8 +17,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import mkdtemp
 
+from cosim.errors import FmuLoadError
 from fmus.fmi.archive import MAX_UNPACKED_BYTES, Archive, open_archive
 from fmus.fmi.standard import fmi_version
+from plant_models.code_trust import WHY_NOT, is_looking, remember
 from plant_models.disk_cache.files import file_digest
 
 VERSIONS = ("1.0", "2.0", "3.0")
@@ -71,7 +73,8 @@ def read_archive(path: Path) -> Archive:
 
 
 def unpack(archive: Archive) -> Path:
-    """A new folder with the files of an FMU that its instances may use; whoever asks for it removes it.
+    """A new folder with the files of an FMU that its instances may use; whoever asks for it removes it. The library in
+    it is code: nothing is unpacked where nothing is run, and the FMU is noted as one that was run here.
 
     Args:
         archive: what `read_archive` returned.
@@ -81,8 +84,12 @@ def unpack(archive: Archive) -> Path:
 
     Raises:
         Exception: the archive is damaged, or the disk full; each compression throws its own.
+        FmuLoadError: nothing is run, see `plant_models.code_trust.looking`.
     """
+    if is_looking():
+        raise FmuLoadError(f"The library of {archive.path} {WHY_NOT}.")
     digest = _digest(archive.path)
+    remember([archive.path])
     content = None if digest is None else _contents.get(digest)
     folder = Path(mkdtemp(prefix="fmu_"))
     try:

@@ -159,21 +159,23 @@ def rerun(
         out: where to write the new results; by default nothing is written.
         overrides: values to change, as for `Scenario.set`.
         tolerance: how far signals may differ, see `cosim.compare`.
-        trust: go on where files of the folder were edited since; by default that is an error.
+        trust: go on where files of the folder were edited since, and where they are code that was never run here; by
+            default that is an error.
         progress, warn, building: as for `Scenario.run`; warnings that the stored results have are not given again.
 
     Raises:
         ProvenanceError: the folder does not say how it was made, a file was edited, or one that was not kept is gone.
+        UntrustedError: it would run code that was never run here.
         CosimError: the scenario cannot be set up any more.
     """
     manifest = read_manifest(directory)
     _check_out(manifest, out)
     edited = _edited(manifest, trust)
-    scenario = _stored_scenario(manifest)
     settings = dict(overrides or {})
+    _demand_all_there(manifest, settings)
+    scenario = _stored_scenario(manifest, trust)
     for name, value in settings.items():
         scenario.set(name, value)
-    _demand_all_there(manifest, settings)
     stored = load_result(directory)
     outcome = scenario.run(progress, warn=_new_ones(warn, stored), building=building)
     paths = {} if out is None else outcome.write(out)  # before anything can be wrong with the comparison
@@ -185,11 +187,11 @@ def rerun(
     return Rerun(Path(directory), manifest, outcome, comparison, verdict, tuple(changes), paths, stored.failure)
 
 
-def _stored_scenario(manifest: Manifest) -> Scenario:
+def _stored_scenario(manifest: Manifest, trust: bool) -> Scenario:
     """The scenario that a results folder holds; the log of all calls, which belongs to its folder, is not written
     again.
     """
-    scenario = Scenario.load(manifest.directory)
+    scenario = Scenario.load(manifest.directory, trust=trust)
     if scenario.table().master.log_calls:
         scenario.master(log_calls=False)
     return scenario

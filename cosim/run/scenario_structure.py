@@ -25,6 +25,7 @@ from cosim.master.events.participant import interrupts
 from cosim.master.events.stride import event_stage_text
 from cosim.network.service import PACKET_STAGE_TEXT
 from cosim.run.balise_service import BaliseRoles, balise_roles
+from cosim.run.code_not_run import NOT_RUN, code_warnings
 from cosim.run.connections import parse_connections
 from cosim.run.coupled import Coupled, couple
 from cosim.run.described_components import describe_component
@@ -99,6 +100,7 @@ def _make_part(
 ) -> Part:
     """A component as data."""
     description = component.description
+    abilities = () if component.kind == NOT_RUN else _abilities(component)
     taken, used = _connected(component.name, connections, clocks)
     hidden = component.event_references()
     inputs = [v for v in description.modelVariables if v.causality == "input" and v.valueReference not in hidden]
@@ -115,7 +117,7 @@ def _make_part(
         tuple(_port(component, v, taken) for v in inputs),
         tuple(_port(component, v, used, None if v.name in silent else tuple(table.get(v.name, ()))) for v in outputs),
         tuple(component.events),
-        _abilities(component),
+        abilities,
         group,
         rate,
         tuple(chain),
@@ -256,8 +258,11 @@ def scenario_structure(task: RunTask) -> Structure:
         table, where = task.table, task.where
         span = table.start, table.stop
         places = {n: f"{where}: components.{n}" for n in table.components}
-        components = {n: describe_component(n, t, task.folder, places[n], span) for n, t in table.components.items()}
-        coupled = couple(task, parse_connections(table.connections, where), components)
+        links = parse_connections(table.connections, where)
+        components = {
+            n: describe_component(n, t, task.folder, places[n], span, links) for n, t in table.components.items()
+        }
+        coupled = couple(task, links, components)
         roles = balise_roles(table.balises, components, where)
         groups = stepping_groups(table, coupled, roles)
         notes = listeners_that_reorder(table, coupled, roles, groups)
@@ -289,7 +294,13 @@ def _structure(
         reason=choice.reason,
         balises=balises,
         network=None if coupled.network is None else _network(coupled.network),
-        warnings=(*_warnings(table, components, connections), *choice.notes, *notes, *refusal),
+        warnings=(
+            *code_warnings(components),
+            *_warnings(table, components, connections),
+            *choice.notes,
+            *notes,
+            *refusal,
+        ),
     )
 
 

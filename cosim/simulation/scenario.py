@@ -21,11 +21,13 @@ from cosim.scenario.origin import Origin
 from cosim.scenario.package_names import is_package, stem
 from cosim.scenario.saving import save_scenario, scenario_text
 from cosim.scenario.shipped import shipped_scenarios
+from cosim.simulation.results_of_others import demand_trust, is_of_results
 from cosim.simulation.scenario_screen import scenario_screen
 from cosim.simulation.stated_scenario import StatedScenario
 from cosim.structure.run_structure import Structure
 from fmus.cli.progress import SIMULATED_TIME, Progress, reported
 from fmus.tables.table import FirstScreen, Parts
+from plant_models.code_trust import is_looking, looking
 
 if TYPE_CHECKING:
     from cosim.components.recording_data import Interpolation
@@ -53,7 +55,7 @@ class Scenario(StatedScenario, FirstScreen):
     """
 
     @classmethod
-    def load(cls, name_or_path: str | Path, *, strict: bool = False) -> Scenario:
+    def load(cls, name_or_path: str | Path, *, strict: bool = False, trust: bool = False) -> Scenario:
         """A shipped scenario by name, or one from a TOML file (paths in it are relative to the file) or from an SSP.
 
         A file is merged with those it names under ``include``; its ``[overrides]`` are applied last.
@@ -62,9 +64,11 @@ class Scenario(StatedScenario, FirstScreen):
             name_or_path: ``freight_profile_d``, ``my.toml``, ``system.ssp``, or ``system.ssp#Variant`` for a structure
                 in it; or a results folder, for the scenario that it was made from.
             strict: whether an SSP whose form is not as the standard wants it is refused; else the run warns of it.
+            trust: whether code that a results folder names may be run although it never was here.
 
         Raises:
             ScenarioError: there is no such scenario, or it is not TOML, or not SSP.
+            UntrustedError: a results folder names such code; where nothing is run, it does not matter.
             ProvenanceError: the results folder does not say what it was made from.
         """
         if is_package(name_or_path):
@@ -74,8 +78,10 @@ class Scenario(StatedScenario, FirstScreen):
             stored = read_manifest(name_or_path)
         path = find_file(name_or_path) if stored is None else stored.scenario
         tables = read_tables(path)
+        if is_of_results(path) and not is_looking():
+            demand_trust(path, tables.data, trust)
         scenario = cls(folder=path.parent, where=str(path))
-        scenario._name = None if stored is None else stored.name
+        scenario._name, scenario._from_file = None if stored is None else stored.name, True
         scenario._data |= tables.data
         scenario._places = tables.places
         return scenario
@@ -85,6 +91,7 @@ class Scenario(StatedScenario, FirstScreen):
         loaded = ssp.load_package(name, strict)
         scenario = cls(where=name)
         scenario._data |= loaded.tables
+        scenario._from_file = True
         scenario._warnings, scenario._files = loaded.warnings, loaded.unpacked
         return scenario
 
@@ -269,8 +276,12 @@ class Scenario(StatedScenario, FirstScreen):
             with reported(progress, shape=SIMULATED_TIME) as report:
                 return run_scenario(task, report, warn, log, building, streaming, self._warnings, finish)
 
-    def structure(self) -> Structure:
+    def structure(self, *, trust: bool = False) -> Structure:
         """How the components hang together: order, groups, loops, what is held over a step. Nothing is run or built.
+
+        Args:
+            trust: whether classes that a file names as ``file.py:Class`` are looked into, which runs their files. Else
+                their texts and the connections say what they have; what a script gave or named itself is known anyway.
 
         Returns:
             The structure, with `text` and `draw`.
@@ -278,5 +289,5 @@ class Scenario(StatedScenario, FirstScreen):
         Raises:
             CosimError: the scenario cannot be set up.
         """
-        with self._places_named():
+        with self._places_named(), looking(is_looking() or (self._from_file and not trust)):
             return scenario_structure(RunTask(self.table(), self.name, self.folder, self.where))

@@ -57,6 +57,7 @@ class StatedScenario:
         self._warnings: list[str] = []
         self._name: str | None = None  # where it is not that of the file
         self._files: object = None  # what keeps unpacked files alive
+        self._from_file = False  # whether it was read, and so may be somebody else's
 
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse what would have no effect, such as ``scenario.step = 0.1``.

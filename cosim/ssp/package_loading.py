@@ -23,6 +23,7 @@ from cosim.ssp.package_data import ComponentElement, SsdStructure
 from cosim.ssp.pipe import Pipe, numeric
 from cosim.ssp.reader import READS_BALISES
 from cosim.ssp.system_structure import read_structure
+from plant_models.user_file import names_code
 
 ORIGIN = ("model", "observer", "as", "preset", "options", "late_policy", "replay_horizon")
 """Keys of a component that say where its FMU came from and how it treats late events."""
@@ -135,11 +136,22 @@ def _component(nets: Nets, path: Path, parameters: Mapping[str, Any], lapses: La
             element.node, f"{element.member} is not the FMU that the annotation speaks of; it is used as it is."
         )
         extras = {key: value for key, value in extras.items() if key not in ORIGIN}
+    code = [text for text in _named(extras) if names_code(text)]
+    if code:
+        lapses.note(element.node, f"the annotation names {code[0]}, code that no package holds; its FMU is used.")
+        extras = {key: value for key, value in extras.items() if key not in ORIGIN}
     if "model" not in extras and "observer" not in extras:
         extras["fmu"] = str(element.fmu)
         extras |= {} if element.interface is None else {"interface": element.interface}
     own = {name: value for name, value in parameters.items() if name not in LATE_PARAMETERS & extras.keys()}
     return extras | ({"parameters": own} if own else {})
+
+
+def _named(extras: Mapping[str, Any]) -> list[str]:
+    """Texts that may name what an FMU was made from: model, observer, options."""
+    options = extras.get("options")
+    stated = [extras.get("model"), extras.get("observer"), *(options.values() if isinstance(options, dict) else ())]
+    return [text for text in stated if isinstance(text, str)]
 
 
 def _takes_our_place(nets: Nets, path: Path, structure: SsdStructure) -> bool:

@@ -65,12 +65,13 @@ def _of_scenario(path: Path) -> Set[str]:
     """Names of outputs, of inputs that are connected, and of events, in a scenario."""
     scenario = Scenario.load(path)
     table = scenario.table()
+    links = parse_connections(table.connections, scenario.where)
     names = {
         output
         for name, component in table.components.items()
-        for output in describe_component(name, component, scenario.folder, scenario.where).names("output")
+        for output in describe_component(name, component, scenario.folder, scenario.where, links=links).names("output")
     }
-    for source, target, *_ in parse_connections(table.connections, scenario.where):
+    for source, target, *_ in links:
         names |= {end.partition(".")[2] for end in (source, target)}
     names |= {BALISE} if table.balises is not None else set()
     return names | ({PACKET} if table.network is not None else set())

@@ -31,6 +31,7 @@ PROGRAM = CommandProgram(
     EXPECTED,
     interruptible,
     in_words,
+    lambda _: False,
 )
 
 

@@ -43,6 +43,7 @@ class _BuildJob:
 GROUP = "Models"
 PLACE = 2
 HELP = "export models as native FMUs"
+LOOKS = False
 EXAMPLES = (
     "fmus build quasi_lpv_uio",
     "fmus build takagi_sugeno_cdo --fmi 3 --platform all -o out/",

@@ -35,6 +35,7 @@ _COLUMNS = (name_column("check"), name_column("verdict"), text_column("detail"))
 GROUP = "FMUs"
 PLACE = 2
 HELP = "how far an FMU can be trusted: validity and behaviour"
+LOOKS = False
 EXAMPLES = ("fmus check vendor.fmu",)
 PARSER = {
     "epilog": (

@@ -2,10 +2,10 @@
 it. Only the file of the command in use is loaded.
 
 Such a file declares, as literals that are read without loading it, `GROUP`, under which the help lists it, `PLACE`, its
-number there in order of use, `HELP`, one line, and where there are any `FORMER`, old spellings with what is typed now;
-then ``EXAMPLES``, lines as they are typed, ``PARSER``, the keywords of its parser, ``ARGUMENTS``, what the parser
-takes, a function ``execute`` unless it consists of `Actions`, and where there are any ``FORMER_OPTIONS``, options of
-today by their former names.
+number there in order of use, `HELP`, one line, `LOOKS`, whether it only looks and so runs no code of others, and where
+there are any `FORMER`, old spellings with what is typed now; then ``EXAMPLES``, lines as they are typed, ``PARSER``,
+the keywords of its parser, ``ARGUMENTS``, what the parser takes, a function ``execute`` unless it consists of
+`Actions`, and where there are any ``FORMER_OPTIONS``, options of today by their former names.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from fmus.cli.warning_lines import warnings_in_lines
 from fmus.tables.table import Table, joined, name_column, text_column
 from fmus.tables.terminal import terminal_width
 from fmus.versions import version_text
+from plant_models.code_trust import looking
 from plant_models.missing_package import missing_package
 
 Execute = Callable[[argparse.Namespace], Output]
@@ -47,13 +48,14 @@ class Command:
 
     Args:
         name: as it is typed. group: under which the help lists it. place: within the group, from 1. help: one line.
-        former: what is typed now, by old spellings.
+        looks: whether it only looks. former: what is typed now, by old spellings.
     """
 
     name: str
     group: str
     place: int
     help: str
+    looks: bool
     former: Mapping[str, str]
 
 
@@ -107,7 +109,7 @@ class Actions:
         for action in self.actions:
             below = subparsers.add_parser(action.name, **action.parser)
             below.examples = [line for line in parser.examples if line.startswith(f"{below.prog} ")]
-            _fill(below, action.arguments, action.execute)
+            _fill(below, action.arguments, action.execute, action.looks)
 
 
 @dataclass(frozen=True)
@@ -116,12 +118,14 @@ class Action:
 
     Args:
         name: as it is typed. execute: what it does. parser: keywords of its parser. arguments: what it takes.
+        looks: whether it only looks.
     """
 
     name: str
     execute: Execute
     parser: Mapping[str, Any] = field(default_factory=dict)
     arguments: Sequence[Argument | ArgumentGroup] = ()
+    looks: bool = False
 
 
 def argument(*names: str, **keywords: Any) -> Argument:
@@ -165,16 +169,18 @@ def _add_command(subparsers: Any, name: str, module: Any) -> None:
     """
     parser = subparsers.add_parser(name, **module.PARSER)
     parser.examples, parser.former = module.EXAMPLES, getattr(module, "FORMER_OPTIONS", {})
-    _fill(parser, module.ARGUMENTS, getattr(module, "execute", None))
+    _fill(parser, module.ARGUMENTS, getattr(module, "execute", None), module.LOOKS)
 
 
-def _fill(parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions], execute: Execute | None) -> None:
+def _fill(
+    parser: Any, arguments: Sequence[Argument | ArgumentGroup | Actions], execute: Execute | None, looks: bool
+) -> None:
     _add_arguments(parser, arguments)
     if execute is not None:
         if "--verbose" not in parser._option_string_actions:
             parser.add_argument("--verbose", action="store_true", help="print warnings whole")
         parser.add_argument("--json", action="store_true", help="print the data as JSON instead of text")
-        parser.set_defaults(execute=execute)
+        parser.set_defaults(execute=execute, looks=looks)
 
 
 @dataclass(frozen=True)
@@ -187,7 +193,8 @@ class CommandProgram:
             where nothing was typed. files: what is done with a file, by its ending, where no command was typed.
         names: what completion offers besides files, by the ``dest`` of an argument. expected: errors that are for the
             user.
-        within: in what a command runs. in_words: what the user reads of an error and the options.
+        within: in what a command runs. in_words: what the user reads of an error and the options. allowed: asks the
+            user whether what an error speaks of is to be allowed; the command is done again then.
     """
 
     name: str
@@ -200,6 +207,7 @@ class CommandProgram:
     expected: tuple[type[BaseException], ...]
     within: Callable[[], AbstractContextManager[None]]
     in_words: Callable[[BaseException, argparse.Namespace], str]
+    allowed: Callable[[BaseException], bool]
 
     def run(self, words: Sequence[str]) -> int:
         """Run the command that was typed.
@@ -221,7 +229,7 @@ class CommandProgram:
             self.parser(words).parse_args(words, options)
             with self.within():
                 with warnings_in_lines(whole=options.verbose):
-                    output: Output = options.execute(options)
+                    output = self._done(options)
                 return output.show(self.name, as_json=options.json)
         except BrokenPipeError:  # whoever read has seen enough, as `head` does
             forget_output()
@@ -238,6 +246,17 @@ class CommandProgram:
         except KeyboardInterrupt:
             print_error(self.name, "interrupted.")
         return MISTAKE
+
+    def _done(self, options: argparse.Namespace) -> Output:
+        """What a command gives; where it only looks, no code of others is run."""
+        with looking(options.looks and not getattr(options, "trust", False)):
+            try:
+                output: Output = options.execute(options)
+            except self.expected as error:
+                if not self.allowed(error):
+                    raise
+                output = options.execute(options)
+        return output
 
     def first_screen(self) -> str:
         """What users come for, with the commands for it."""
@@ -306,8 +325,9 @@ def _declared(name: str, file: Path) -> Command:
     """What the file of a command declares of it."""
     assigned = [s for s in ast.parse(file.read_text(encoding="utf-8")).body if isinstance(s, ast.Assign)]
     literals = {ast.unparse(s.targets[0]): s.value for s in assigned}
-    found = {key: ast.literal_eval(literals[key]) for key in ("GROUP", "PLACE", "HELP", "FORMER") if key in literals}
-    return Command(name, found["GROUP"], found["PLACE"], found["HELP"], found.get("FORMER", {}))
+    keys = ("GROUP", "PLACE", "HELP", "LOOKS", "FORMER")
+    found = {key.lower(): ast.literal_eval(literals[key]) for key in keys if key in literals}
+    return Command(name, **{"former": {}, **found})
 
 
 def _unknown(name: str, commands: Sequence[Command], program: CommandProgram) -> str:

@@ -12,6 +12,7 @@ from fmus.source_build import add_libraries, compile_sources
 GROUP = "FMUs"
 PLACE = 3
 HELP = "compile the C sources of an FMU that has no library for this machine"
+LOOKS = False
 EXAMPLES = ("fmus compile vendor.fmu", "fmus compile vendor.fmu -o vendor_with_library.fmu")
 PARSER = {
     "description": (

@@ -15,6 +15,7 @@ PROBLEMS = 1
 GROUP = "FMUs"
 PLACE = 1
 HELP = "what an FMU says about itself, and whether it is valid"
+LOOKS = True
 EXAMPLES = ("fmus info vendor.fmu",)
 PARSER = {"epilog": "Exit codes: 0 the description is valid, 1 it has problems, 2 error."}
 ARGUMENTS = (argument("file", type=Path, metavar="FILE"),)

@@ -13,6 +13,7 @@ from fmus.tables.table import Table, name_column, text_column
 GROUP = "Models"
 PLACE = 1
 HELP = "models that can be exported, with their presets and options"
+LOOKS = True
 EXAMPLES = (
     "fmus list",
     "fmus list --json",

@@ -216,7 +216,7 @@ def test_every_command_prints_warnings_a_line_each_and_whole_where_asked(
         warnings.warn("a number is\nnot finite; it is left out", stacklevel=1)
         return Output(verdict="Well.")
 
-    changed: Any = lambda parser, **_: parser._defaults.update(execute=warns)  # noqa: E731
+    changed: Any = lambda parser, **said: parser._defaults.update(said, execute=warns)  # noqa: E731
     monkeypatch.setattr(argparse.ArgumentParser, "set_defaults", changed)
     words = LINES[case[0]][name].replace("--verbose", "").split()
     assert program.run(words) == 0
@@ -234,7 +234,7 @@ def test_a_terminal_that_knows_ascii_alone_shows_the_rest(program: str, monkeypa
     shown = io.TextIOWrapper(io.BytesIO(), "ascii")
     monkeypatch.setattr(sys, "stdout", shown)
     monkeypatch.setattr(
-        argparse.ArgumentParser, "set_defaults", lambda parser, **_: parser._defaults.update(execute=dash)
+        argparse.ArgumentParser, "set_defaults", lambda parser, **said: parser._defaults.update(said, execute=dash)
     )
     assert PROGRAMS[program].run(["list"]) == 0
     shown.seek(0)

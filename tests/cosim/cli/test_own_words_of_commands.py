@@ -34,8 +34,8 @@ STEPPING = {
 ASKING = {
     "certify": "certify {file}:Evaluated",
     "linearise": "linearise {file}:Traced",
-    "show": "show TRACED",
-    "export": "export TRACED OUT.ssp",
+    "show": "show TRACED --trust",
+    "export": "export TRACED OUT.ssp --trust",
 }
 # they step and ask nothing: they read results or what is declared
 READING = {"compare", "report", "open", "new", "list", "info"}
