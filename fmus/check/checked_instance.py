@@ -14,12 +14,14 @@ from typing import Any
 
 from fmpy.model_description import ModelDescription
 
+from fmus.exchange.description import is_solved
+from fmus.exchange.slave import as_slave
 from fmus.fmi.elements import elements_of
 from fmus.fmi.fmi2 import FMI2Slave
 from fmus.fmi.fmi3 import FMI3Slave
 from fmus.fmi.instance import Instance
 from fmus.fmi.library import load
-from fmus.fmi.standard import fmi_version
+from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, fmi_version
 from fmus.fmi.types import NUMERIC_TYPES
 from fmus.plain import one_line
 
@@ -62,8 +64,10 @@ class FmuInstance(Instance):
         self.messages: deque[str] = deque(maxlen=_MESSAGES_KEPT)
         self.ends = True  # whether it is terminated and freed; an FMU that dies there is left as it is
         self.announce: Callable[[str], None] = lambda _what: None  # the call that ends it, and nothing after it
-        slave = self.guard(LOADING, lambda: load(folder, description, self.interface, name))
-        super().__init__(name, slave, description)
+        solved = self.interface == CO_SIMULATION and is_solved(description)
+        kind = MODEL_EXCHANGE if solved else self.interface
+        slave = self.guard(LOADING, lambda: load(folder, description, kind, name))
+        super().__init__(name, as_slave(slave, description) if solved else slave, description)
         self.logging = logging
 
     @property
@@ -120,7 +124,8 @@ FmuSlave = FmuSlave2 | FmuSlave3
 def make_slave(
     folder: Path, description: ModelDescription, name: str = "checked", *, logging: bool = False
 ) -> FmuSlave:
-    """See `FmuInstance`: one for co-simulation, of the version of its description, not yet instantiated.
+    """See `FmuInstance`: one that is stepped, of the version of its description, not yet instantiated. A solver moves
+    that of a description from `as_stepped`.
 
     Raises:
         SlaveError: the library cannot be loaded.

@@ -20,7 +20,7 @@ def what_to_trust(findings: Iterable[CheckFinding]) -> list[str]:
     """
     by_name = {finding.check: finding for finding in findings}
     if "stepping" not in by_name:
-        return _no_steps(by_name)
+        return ["Nothing: it was not run."]
     if by_name["stepping"].verdict in (Verdict.DISTRUST, Verdict.ERROR, Verdict.SKIPPED):
         return ["Nothing: it could not be stepped."]
     sentences = [
@@ -44,16 +44,6 @@ def _failed(findings: Mapping[str, CheckFinding], *names: str) -> bool:
 
 def _why_not(findings: Mapping[str, CheckFinding], name: str) -> str:
     return "not declared" if "declare" in findings[name].detail else findings[name].detail
-
-
-def _no_steps(findings: Mapping[str, CheckFinding]) -> list[str]:
-    if _good(findings, "model exchange: initialise", "model exchange: values at start"):
-        state = _good(findings, "model exchange: state round trip")
-        return [
-            "It has model exchange only: a solver can integrate it"
-            + (" and restore its state exactly." if state else "; do not rely on saved states.")
-        ]
-    return ["Nothing: it was not run."]
 
 
 def _variable_step(findings: Mapping[str, CheckFinding]) -> str:

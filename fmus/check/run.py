@@ -22,7 +22,7 @@ from fmus.check.known_checks import CHECKS
 from fmus.check.runner import end_of_experiment
 from fmus.fmi.archive import Archive, NotAnFmuError, open_archive
 from fmus.fmi.instance import INSTANTIATING
-from fmus.fmi.standard import CO_SIMULATION, SCHEDULED_EXECUTION
+from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION
 from fmus.fmi.types import NUMERIC_TYPES, why_not_set
 from plant_models.registry import log_left_out
 from plant_models.user_file import UserFileError, name_of
@@ -37,7 +37,10 @@ WHOLE = 1e-6
 """Share of a step by which an end may miss a whole number of steps."""
 
 _UNRUNNABLE = (f"{LOADING} failed", f"{INSTANTIATING} failed")
-_NO_SLAVE = "there is no co-simulation: a master needs a solver for it, as cosim has; such steps are not checked here"
+_NO_SLAVE = "there is neither co-simulation nor model exchange: nothing here can step it"
+_SOLVED = "there is no co-simulation: what was stepped is its model exchange, by the solver that runs use (CVODE)"
+_OF_LIBRARY = ("loading", "exported symbols")
+"""Checks of what model exchange has of its own."""
 _STATIC = {"validation": validation, "platforms": platforms}
 
 
@@ -157,23 +160,28 @@ def _run_findings(archive: Archive, job: CheckJob, progress: Callable[[str], Non
     findings: list[CheckFinding] = []
     left_out: dict[str, str] = {}
     with archive.unpacked() as folder:
-        for interface in archive.interfaces:
+        for interface in _looked_at(archive):
             if interface == SCHEDULED_EXECUTION:
                 findings.append(CheckFinding("scheduled execution", Verdict.SKIPPED, "looked at, never run"))
                 continue
             names = tuple(_checks_of(interface, left_out.__setitem__))
+            if interface not in archive.interfaces:
+                names = tuple(name for name in names if name not in _OF_LIBRARY)
             places = _registered_places(names)
             one = replace(job, folder=str(folder), interface=interface, checks=names, places=places)
             findings += _meant(archive, interface, run_isolated(one, progress))
     _demand_runnable(archive, findings)
     findings += [CheckFinding(name, Verdict.NOTE, f"left out: {reason}") for name, reason in left_out.items()]
-    if CO_SIMULATION not in archive.interfaces:
-        findings.append(
-            CheckFinding(
-                "interface", Verdict.LIMIT, _NO_SLAVE, "step it where a solver is: cosim run, or one of your own"
-            )
-        )
+    if CO_SIMULATION not in _looked_at(archive):
+        findings.append(CheckFinding("interface", Verdict.LIMIT, _NO_SLAVE, "use a master that schedules its parts"))
+    elif CO_SIMULATION not in archive.interfaces:
+        findings.append(CheckFinding("interface", Verdict.NOTE, _SOLVED))
     return findings
+
+
+def _looked_at(archive: Archive) -> list[str]:
+    """Interface types whose checks are made: model exchange alone is stepped by the solver of runs as well."""
+    return [*archive.interfaces, *([CO_SIMULATION] if set(archive.interfaces) == {MODEL_EXCHANGE} else [])]
 
 
 def check_count(archive: Archive) -> int:
@@ -182,7 +190,7 @@ def check_count(archive: Archive) -> int:
     Args:
         archive: the FMU file.
     """
-    return len(_STATIC) + sum(len(_checks_of(interface)) for interface in archive.interfaces)
+    return len(_STATIC) + sum(len(_checks_of(interface)) for interface in _looked_at(archive))
 
 
 def _default_step(description: ModelDescription) -> float:

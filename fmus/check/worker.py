@@ -21,6 +21,7 @@ from fmus.check.context import Context
 from fmus.check.findings import CheckFinding, CheckOutcome, Verdict, failed
 from fmus.check.job import CheckJob
 from fmus.check.known_checks import CHECKS, EXPECTED
+from fmus.exchange.description import as_stepped
 from fmus.fmi.description import read_description
 from plant_models.user_file import UserFileError, load_class
 
@@ -63,7 +64,7 @@ def run(job: CheckJob, report: Callable[[dict[str, Any]], None]) -> None:
         report: is called with ``{"start": name}`` before each check, with its finding after it, and with ``{"ending":
             call}`` before a call that ends an instance.
     """
-    description = read_description(Path(job.folder))
+    description = as_stepped(read_description(Path(job.folder)))
     folder = Path(job.folder)
     context = Context(folder, description, job.step, job.start_time, job.starts, job.budget, job.steps, job.ends)
     context.announce = lambda call: report({"ending": call, "only_once": context.only_once})

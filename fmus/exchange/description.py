@@ -14,6 +14,15 @@ class SolvedCoSimulation(CoSimulation):  # type: ignore[misc]
     """What a model exchange FMU can do once a solver moves it here."""
 
 
+def is_solved(description: ModelDescription) -> bool:
+    """Whether a description is that of a model exchange FMU that a solver here moves: see `as_stepped`.
+
+    Args:
+        description: of the slave.
+    """
+    return isinstance(description.coSimulation, SolvedCoSimulation)
+
+
 def stepped_by(description: ModelDescription, interface: Interface | None = None) -> str | None:
     """Which interface type of an FMU is stepped, in the words of fmpy; None where it does not offer it.
 

@@ -183,6 +183,8 @@ class Motion:
         Raises:
             FMICallException: the FMU refuses. SolverError: the solver cannot go on, or events do not settle.
         """
+        if until < t:
+            raise SolverError(f"a step from t = {t:.12g} s back to {until:.12g} s")
         for _ in range(MAX_RETURNS_PER_STEP):
             if self.in_event_mode:
                 self.settle()

@@ -255,4 +255,4 @@ def test_one_instance_in_a_process(tmp_path: Path) -> None:
 def test_honest_model_exchange_alone(tmp_path: Path) -> None:
     report = checked(tmp_path, xml=description(None, STATES))
     assert set(problems(report)) == {"interface"}
-    assert report.trust == ("It has model exchange only: a solver can integrate it and restore its state exactly.",)
+    assert report.clean

@@ -183,7 +183,8 @@ static int slopes(Model *m, const unsigned *rate, size_t n, const unsigned *stat
 #if defined(SLOPES)
     for (size_t i = 0; i < n; i++) {
         out[i] = 0.0;
-        for (size_t j = 0; j < k; j++) out[i] += seed[j] * slope(m, rate[i], state[j]);
+        for (size_t j = 0; j < k; j++) /* an output is a state, and nothing depends on the input */
+            out[i] += state[j] == 3 ? 0.0 : seed[j] * (rate[i] < 3 ? rate[i] == state[j] : slope(m, rate[i], state[j]));
     }
     return 0;
 #else
