@@ -104,7 +104,8 @@ class FMI3Slave(FMI3Instance, Slave):
             RunError: doStep failed, or says that it reached a time outside the step.
         """
         note = self._call_note
-        t = min(t, self.left_at.value)
+        left = self.left_at.value
+        t = left if left < t else t
         note.call[0], note.time[0] = self._step_number, t
         begin = perf_counter()
         try:
@@ -119,7 +120,8 @@ class FMI3Slave(FMI3Instance, Slave):
         finally:
             self.seconds += perf_counter() - begin
             self.calls += 1
-        beyond = until + TIME_TOLERANCE < reached < NEVER  # which stands in where the compiled stepper did the step
+        # NEVER stands in where the compiled stepper did the step
+        beyond = reached > until and until + TIME_TOLERANCE < reached < NEVER
         if event or early or beyond:
             self._note_contradictions(t, bool(event), bool(early), beyond)
         if terminate:
@@ -128,7 +130,9 @@ class FMI3Slave(FMI3Instance, Slave):
             early = early or t + TIME_TOLERANCE < reached < until - TIME_TOLERANCE
         # lastSuccessfulTime may then be that of an internal step: the slave stands where it was asked to go
         if not early:
-            self.time, self.left_at.value = until, math.inf
+            self.time = until
+            if left < math.inf:
+                self.left_at.value = math.inf
             return until, event
         if not t - TIME_TOLERANCE <= reached <= until + TIME_TOLERANCE:
             raise self.failure(f"doStep to {until:g} s says that it reached {reached!r} s", t)
@@ -302,11 +306,11 @@ def _native_step(slave: Any, no_way_back: ctypes.c_int) -> Callable[[float, floa
     """fmpy's doStep of a native slave with its four results allocated once instead of at every call."""
     event, terminate, early, reached = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
     results = (ctypes.byref(event), ctypes.byref(terminate), ctypes.byref(early), ctypes.byref(reached))
-    start, length, flag = ctypes.c_double(), ctypes.c_double(), ctypes.c_bool()
+    start, length = ctypes.c_double(), ctypes.c_double()
+    flag = ctypes.c_bool.from_buffer(no_way_back)  # its low byte: all platforms of FMUs are little-endian
     call = prepared_call(slave, "fmi3DoStep", slave.component, start, length, flag, *results)
 
     def do_step(t: float, h: float) -> tuple[bool, bool, bool, float]:
-        flag.value = no_way_back.value != 0
         start.value, length.value, reached.value = t, h, t + h  # the last for slaves that do not fill it in
         call()
         return event.value, terminate.value, early.value, reached.value
