@@ -30,6 +30,7 @@ from fmu_observer.block.policy import Counters, communicate
 from fmu_observer.block.timing import MOST_INTERNAL_STEPS, Timing
 from fmu_observer.event_protocol import LATE_POLICIES, OUTCOME_VARIABLES, EventProtocol
 from plant_models.hybrid import HybridSystem, Runtime, Snapshot, scalar_names
+from plant_models.hybrid.switching import ChatteringError
 
 STEP_TOLERANCE = 1e-6
 """So much of a step may the master's time be off in addition, for masters that add their steps up [1]."""
@@ -406,4 +407,6 @@ class BlockInstance:
 
 def _model_failure(error: Exception) -> BlockError:
     """What the functions of a system throw is a failed call, with the original as its cause."""
+    if isinstance(error, ChatteringError):
+        return BlockError(str(error))
     return BlockError(f"the model failed: {type(error).__name__}: {error}")

@@ -206,6 +206,8 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     bool ticked = any_clock_is_active(instance);
     Status status = events_poll_clocks(instance);
     status = status_worse(status, events_apply_until(instance, ((Instance *)instance)->runtime.clock.t));
+    if (step_check_switches(instance, __func__) != STATUS_OK)
+        status = STATUS_ERROR; /* in what a late event repeats */
     put(discreteStatesNeedUpdate, fmi3False);
     put(terminateSimulation, fmi3False);
     put(nominalsOfContinuousStatesChanged, fmi3False);

@@ -117,6 +117,7 @@ PRIVATE void runtime_reset(Runtime *runtime) {
     *runtime->horizon = model.replay_horizon;
     runtime->clock.t = runtime->clock.t0 = 0.0;
     runtime->clock.h = runtime->p[model.internal_step];
+    runtime->chattering = -1;
 }
 
 /* -- evaluation (the kernel of `kernel.py`) ------------------------------------------------------------------------ */
@@ -282,10 +283,17 @@ PRIVATE int runtime_start(Runtime *runtime, double t0) {
     return -1;
 }
 
+/* Time stands at `target`, unless it stands where a switch chatters. */
+static void arrive(Runtime *runtime, double target) {
+    if (runtime->chattering < 0)
+        runtime->clock.t = target;
+}
+
 /* Move to `target` through whole cells of the grid, with a part of a cell at either end. */
 static void integrate(Runtime *runtime, double target) {
     double t = runtime->clock.t, t0 = runtime->clock.t0, h = runtime->clock.h;
     double tolerance = runtime_tolerance(runtime, target);
+    runtime->divisions = 0;
     if (target - t <= tolerance || model.step == NULL) { /* where nothing flows there is no grid */
         runtime->clock.t = fmax(t, target);
         return;
@@ -297,7 +305,7 @@ static void integrate(Runtime *runtime, double target) {
         if (boundary >= target - tolerance) {
             /* a target on the boundary but for rounding is the boundary */
             switching_step(runtime, t, (boundary <= target + tolerance ? boundary : target) - t);
-            runtime->clock.t = target;
+            arrive(runtime, target);
             return;
         }
         switching_step(runtime, t, boundary - t);
@@ -305,14 +313,14 @@ static void integrate(Runtime *runtime, double target) {
     }
     double whole = floor((target - t0) / h + tolerance / h) - k;
     if (whole > 0.0) {
-        for (double i = 0.0; i < whole; i += 1.0)
+        for (double i = 0.0; i < whole && runtime->chattering < 0; i += 1.0)
             switching_step(runtime, t0 + (k + i) * h, h);
         k += whole;
     }
     double rest = target - (t0 + k * h);
     if (rest > tolerance)
         switching_step(runtime, t0 + k * h, rest);
-    runtime->clock.t = target;
+    arrive(runtime, target);
 }
 
 PRIVATE void runtime_advance(Runtime *runtime, double t_end) {
@@ -321,6 +329,8 @@ PRIVATE void runtime_advance(Runtime *runtime, double t_end) {
         if (due > t_end + runtime_tolerance(runtime, t_end))
             break;
         integrate(runtime, due);
+        if (runtime->chattering >= 0)
+            return;
         runtime_fire_due(runtime);
     }
     integrate(runtime, t_end);

@@ -25,6 +25,8 @@ typedef struct {
 
 typedef struct {
     Clock clock;
+    int divisions;  /* of internal steps since the last event or end of a step; decides nothing but when to give up */
+    int chattering; /* the switch for which that was given up, or -1; whoever finds it undoes the step */
     double *memory; /* `runtime_memory_length()` numbers; the arrays down to `queue` lie in it */
     double *x, *u, *p;
     double *periods, *offsets, *ticks; /* by periodic event; a tick is a whole number */

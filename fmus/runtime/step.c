@@ -48,6 +48,16 @@ static Status move(Instance *instance, double end) {
     return status_worse(counts, events);
 }
 
+PRIVATE Status step_check_switches(Instance *instance, const char *function) {
+    Runtime *runtime = &instance->runtime;
+    int chattering = runtime->chattering;
+    if (chattering < 0)
+        return STATUS_OK;
+    runtime->chattering = -1;
+    return instance_discard(instance, "%s: %s changes its sign without end at %.17g s; check inputs and parameters", function,
+                            variables_name(ROLES(ROLE_INDICATOR), model.friction_count + chattering), runtime->clock.t);
+}
+
 /* Not to be seen an end of is a step that cannot be done. */
 static Status check_size(Instance *instance, const char *function, double size, double end) {
     instance->discarded = !(runtime_count_steps(&instance->runtime, end) <= MOST_INTERNAL_STEPS);
@@ -69,8 +79,9 @@ PRIVATE Status instance_do_step(Instance *instance, const char *function, double
     remember(instance);
     instance->outdated = OUTDATED_ALL;
     Status status = move(instance, fmin(due, end));
+    Status switches = step_check_switches(instance, function);
     int broken = runtime_first_broken_state(&instance->runtime);
-    instance->discarded = broken >= 0;
+    instance->discarded = switches != STATUS_OK || broken >= 0;
     if (early != NULL)
         *early = due < end && !instance->discarded;
     if (!instance->discarded) {
@@ -78,6 +89,8 @@ PRIVATE Status instance_do_step(Instance *instance, const char *function, double
         return status;
     }
     undo_step(instance);
+    if (switches != STATUS_OK)
+        return switches;
     return instance_discard(instance, "%s: state %s is not a finite number at %.17g s; the step is undone; check inputs, parameters "
                             "and internal_step", function, variables_name(ROLES(ROLE_STATE), broken), fmin(due, end));
 }

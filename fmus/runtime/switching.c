@@ -4,6 +4,9 @@
 #include <string.h>
 
 #define MOST_SWITCHES 100 /* in one internal step; what chatters more is no longer divided */
+#ifndef MOST_DIVISIONS
+#define MOST_DIVISIONS 100000 /* between two events; what chatters more is given up, each division costs some 50 trials */
+#endif
 
 /* Compute the state after an internal step; whether a switch changes on the way. */
 static bool attempt(Runtime *runtime, double t, double h) {
@@ -32,12 +35,31 @@ static double until_switch(Runtime *runtime, double t, double h) {
     return after;
 }
 
+/* The switch that changes in the part tried last is the one that chatters, and time stands there for whoever undoes the step. */
+static void give_up(Runtime *runtime, double t, double h) {
+    const double *now = runtime_switching(runtime);
+    double *before = runtime->indicators;
+    runtime->clock.t = t;
+    runtime_update_balance(runtime);
+    memcpy(before, now, (size_t)model.switching_count * sizeof(double));
+    accept_step(runtime);
+    runtime->clock.t = t + h;
+    runtime_update_balance(runtime);
+    runtime->chattering = 0;
+    while (runtime->chattering < model.switching_count - 1 && (now[runtime->chattering] >= 0.0) == (before[runtime->chattering] >= 0.0))
+        runtime->chattering++;
+}
+
 /* A step on which a switch changes, as was just tried: in parts that end where one does. */
 static void divided_step(Runtime *runtime, double t, double h) {
     double end = t + h;
     for (int i = 0; i < MOST_SWITCHES; i++) {
         h = until_switch(runtime, t, h);
         attempt(runtime, t, h);
+        if (++runtime->divisions > MOST_DIVISIONS) {
+            give_up(runtime, t, h);
+            return;
+        }
         accept_step(runtime);
         t += h;
         h = end - t;
@@ -50,7 +72,7 @@ static void divided_step(Runtime *runtime, double t, double h) {
 }
 
 PRIVATE void switching_step(Runtime *runtime, double t, double h) {
-    if (model.step == NULL)
+    if (model.step == NULL || runtime->chattering >= 0)
         return;
     if (attempt(runtime, t, h))
         divided_step(runtime, t, h);

@@ -7,6 +7,7 @@ distinguish them.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Protocol
 from weakref import WeakKeyDictionary
@@ -34,6 +35,7 @@ class Kernel(Protocol):
         x: state, shape (n,). u: inputs, payloads and noises, shape (m,). p: parameters, shape (k,). y: outputs, shape
         (q,).
         memory: x, u and p in one contiguous array of shape (n + m + k,), of which they are views.
+        divisions: of internal steps at switches since the last event or end of a step, for whoever begins to set.
     """
 
     x: np.ndarray
@@ -41,6 +43,7 @@ class Kernel(Protocol):
     p: np.ndarray
     y: np.ndarray
     memory: np.ndarray
+    divisions: int
 
     def step(self, t: float, h: float) -> None:
         """Advance `x` by one internal step of length `h` [s] from `t` [s], divided where switches change."""
@@ -60,13 +63,26 @@ def make_kernel(system: HybridSystem) -> Kernel:
     return TracedKernel(system) if system.traceable else NumpyKernel(system)
 
 
-class _Arrays:
+class _Arrays(ABC):
     def __init__(self, system: HybridSystem) -> None:
         parts = [system.start_state(), system.start_inputs(), system.start_parameters()]
         self.memory = np.concatenate(parts)
         n, m = len(parts[0]), len(parts[1])
         self.x, self.u, self.p = self.memory[:n], self.memory[n : n + m], self.memory[n + m :]
         self.y = np.zeros(sum(s.width for s in system.outputs))
+        self.system, self.divisions = system, 0
+
+    def accept_change(self, t: float, h: float) -> str:
+        """See `Trial`."""
+        before = self.system.switching_vector(t, self.x, self.u, self.p)
+        self.accept()
+        now = self.system.switching_vector(t + h, self.x, self.u, self.p)
+        changed = (name for name, a, b in zip(self.system.switchings, before, now, strict=True) if (a >= 0) != (b >= 0))
+        return next(changed, self.system.switchings[-1])
+
+    @abstractmethod
+    def accept(self) -> None:
+        """See `Trial`."""
 
 
 class NumpyKernel(_Arrays):
@@ -74,7 +90,6 @@ class NumpyKernel(_Arrays):
 
     def __init__(self, system: HybridSystem) -> None:
         super().__init__(system)
-        self.system = system
         self._traced = traced_once(system) if system.method == "rosenbrock" else None
         self._x_next = self.x
 

@@ -93,7 +93,11 @@ class Runtime:
         self.communicate()
 
     def advance(self, t_end: float) -> None:
-        """Integrate to `t_end` [s] and fire the periodic events on the way and at the end."""
+        """Integrate to `t_end` [s] and fire the periodic events on the way and at the end.
+
+        Raises:
+            ChatteringError: a switch changes without end; states and time are those somewhere on the way.
+        """
         tolerance = self._grid_tolerance + 4.0 * ulp(t_end)
         while self._due <= t_end + tolerance:
             self._integrate(self._due, self._grid_tolerance + 4.0 * ulp(self._due))
@@ -210,6 +214,7 @@ class Runtime:
     def _integrate(self, target: float, tolerance: float) -> None:
         """Move to `target` through whole cells of the grid, with a part of a cell at either end."""
         h = self._h
+        self._kernel.divisions = 0
         if target - self.t <= tolerance:
             self.t = max(self.t, target)
             return

@@ -4,6 +4,7 @@ zone.
 
 from __future__ import annotations
 
+import os
 import re
 import struct
 from collections.abc import Callable
@@ -15,7 +16,8 @@ from exchange_importer import Exchange, Importer
 from fmpy.fmi1 import FMICallException
 
 from fmu_observer.block import make_block
-from plant_models.hybrid import HybridSystem, output_signal, parameter, state, vector
+from fmu_observer.block.block_variables import StepDiscarded
+from plant_models.hybrid import HybridSystem, output_signal, parameter, state, switching, vector
 
 pytestmark = pytest.mark.compiler
 
@@ -92,6 +94,66 @@ def test_switches_that_chatter_do_not_stop_time(component: Callable[..., Any]) -
     made.initialize()
     made.step(0.0, 0.1)
     assert made.get("clock")[0] == pytest.approx(0.1, abs=1e-12)
+
+
+class ChatteringBesideAnother(Chattering):
+    """The switch that chatters is the second one."""
+
+    switchings = ("never", "side")
+
+    def switching(self, t: Any, x: Any, u: Any, p: Any) -> Any:
+        return vector(x.elapsed + 1.0, x.place - p.middle)
+
+    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+        push = 50.0 - 100.0 * self.switches(t, x, u, p)[1]
+        return {"place": push, "elapsed": 1.0 + 0.0 * push}
+
+
+@pytest.mark.parametrize("system", [Chattering, ChatteringBesideAnother])
+def test_a_step_in_which_a_switch_chatters_without_end_is_discarded(
+    system: type[HybridSystem], version: int, component: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """FMU and block give up the same steps at the same instant, name the switch, and go on with shorter steps; a bound
+    of 350 divisions stands for that of 100 000, which costs the block seconds.
+    """
+    monkeypatch.setattr(switching, "MOST_DIVISIONS", 350)
+    monkeypatch.setenv("CFLAGS", f"{os.environ['CFLAGS']} -DMOST_DIVISIONS=350")
+    made, block = component(system(), version), make_block(system(), version)
+    made.initialize()
+    block.instantiate()
+    initialise(block, version)
+    t, gave_up = 0.0, 0
+    for h in (0.03, 0.05, 0.02, 1e3, 0.025, 0.01, 0.05):  # a hundred divisions in each 0.01 s
+        instants = []
+        for step in (block.instance.step, made.step):
+            try:
+                step(t, h)
+            except (FMICallException, StepDiscarded) as error:
+                said = str(error) if isinstance(error, StepDiscarded) else made.log[-1]
+                found = re.search(r"event_indicator\.side changes its sign without end at (\S+) s", said)
+                assert found, said
+                instants.append(float(found[1]))
+        assert len(instants) in (0, 2)
+        assert len(instants) == (2 if h > 0.035 else 0)
+        if instants:
+            gave_up += 1
+            assert instants[0] == pytest.approx(instants[1], abs=1e-12)
+            assert t < instants[0] < t + 0.04
+        else:
+            t += h
+        assert made.get("clock")[0] == pytest.approx(t, abs=1e-12)
+        assert block.instance.runtime.t == pytest.approx(t, abs=1e-12)
+    assert gave_up == 3
+
+
+def initialise(block: Any, version: int) -> None:
+    """From its instantiation to its first step."""
+    if version == 2:
+        block.setupExperiment(startTime=0.0)
+        block.enterInitializationMode()
+    else:
+        block.enterInitializationMode(startTime=0.0)
+    block.exitInitializationMode()
 
 
 def test_what_parameters_must_fulfil_together_is_refused_with_their_values(component: Callable[..., Any]) -> None:
