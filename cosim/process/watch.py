@@ -6,6 +6,7 @@ signals on, ends a call that takes too long, and keeps what was computed when th
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import select
@@ -26,6 +27,12 @@ _POLL = 0.1
 
 GRACE = 3.0
 """A call that has not returned so long after Ctrl-C is ended with its process [s]."""
+
+_CLOSED = 256
+"""Said in place of an exit code where what the process had opened was closed by somebody else."""
+_WHO_CLOSED = (
+    "an FMU closed files that this program had open: its standard streams, or its results. 'fmus check' finds which FMU"
+)
 
 _PARENT_DEATH = 1  # prctl: PR_SET_PDEATHSIG
 
@@ -56,14 +63,33 @@ def _run(command: Callable[[], int], parent: int) -> int:
     LAST_CALL.watched = LAST_CALL.timed = True
     _end_with(parent)
     code = 1  # of a program that ends with a traceback
+    streams = _open_streams()
     try:
         code = command()
+    except OSError as error:
+        if error.errno != errno.EBADF:
+            raise
+        code = _CLOSED
     except SystemExit as end:
         code = end.code if isinstance(end.code, int) else int(end.code is not None)
         raise
     finally:
+        if _open_streams() < streams:
+            code = _CLOSED
         LAST_CALL.end(code)
+        if code == _CLOSED:
+            os._exit(ERROR)  # nothing more can be said from here
     return code
+
+
+def _open_streams() -> set[int]:
+    """Which of the standard streams for output are open."""
+    found = set()
+    for number in (1, 2):
+        with suppress(OSError):
+            os.fstat(number)
+            found.add(number)
+    return found
 
 
 def _end_with(parent: int) -> None:
@@ -94,16 +120,20 @@ class _Watch:
         for number in STOPPING:
             signal.signal(number, signal.SIG_IGN)  # what is kept now is kept quickly
         code = LAST_CALL.exit_code
-        if code is not None:
+        if code is not None and code != _CLOSED:
             return code
-        where = LAST_CALL.words()
-        what = self._why or _how_it_ended(os.waitstatus_to_exitcode(status))
-        reason = f"{where} {what}" if where else f"the program {what}, in no call of an FMU"
+        reason = _WHO_CLOSED if code == _CLOSED else self._reason(status)
         if sys.stderr.isatty():
             print(file=sys.stderr)  # there may be a progress bar
         print(f"cosim: {reason}.", file=sys.stderr)
         self._keep(reason)
         return ERROR
+
+    def _reason(self, status: int) -> str:
+        """Why a process ended that did not come to its end as it should."""
+        where = LAST_CALL.words()
+        what = self._why or _how_it_ended(os.waitstatus_to_exitcode(status))
+        return f"{where} {what}" if where else f"the program {what}, in no call of an FMU"
 
     def _status(self) -> int:
         """Look at the other process until it ends; how it did."""

@@ -109,6 +109,19 @@ def test_a_death_is_reported_and_every_row_is_kept(
     assert not (tmp_path / "out" / ".unfinished").exists()
 
 
+@pytest.mark.parametrize("deed", ["closes-opened", "closes-all"])
+@pytest.mark.parametrize("options", [(), ("--stream",)])
+def test_who_closes_the_files_of_the_program_is_told_and_loses_no_row(
+    deed: str, options: tuple[str, ...], fmu: Path, tmp_path: Path
+) -> None:
+    """Rows are in a map of memory, which no descriptor is needed for."""
+    said = reported(start(fmu, tmp_path, deed, *options))
+    assert "an FMU closed files that this program had open" in said
+    result = load_result(tmp_path / "out")
+    assert (result.failure or "").startswith("the run did not end")
+    assert result.time[-1] >= 0.24  # where it closed them
+
+
 def test_what_was_streamed_is_whole(fmu: Path, tmp_path: Path) -> None:
     reported(start(fmu, tmp_path, "crashes", "--stream", stepper="python"))
     result = load_result(tmp_path / "out")

@@ -437,6 +437,8 @@ DEEDS = (
     "handles",
     "lowers-limits",
     "masks",
+    "closes-opened",
+    "closes-all",
 )
 """What `hostile_fmu` does with ``deed = 0, 1, 2, ...``"""
 
@@ -447,8 +449,8 @@ def hostile_fmu(folder: Path, name: str = "hostile", beside: Path | None = None)
     or the rounding mode, logs escape sequences, sends SIGINT to its own process, bounds ``at`` to 0.3, overwrites it
     with that, returns a warning from there on, does not return from fmi2FreeInstance or fmi2Terminate, refuses the
     latter, closes the standard output, ignores SIGINT, sets another locale or an environment variable, ignores SIGUSR2,
-    lowers a limit of the process, takes all permissions from new files. `beside` is a shared library that it brings
-    along."""
+    lowers a limit of the process, takes all permissions from new files, closes all files but the standard streams, or
+    these too. `beside` is a shared library that it brings along."""
     parameters = [Variable("deed", 1, "parameter", start=0.0), Variable("at", 2, "parameter", start=0.25)]
     variables = [TIME, *parameters, Variable("y", 3, "output")]
     return build_fmu(folder, name, "hostile.c", 2, variables, capability_flags(2), {}, beside=beside)

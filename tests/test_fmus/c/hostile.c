@@ -14,7 +14,7 @@
 enum {
     NOTHING, EXITS, EXITS_AT_ONCE, CRASHES, HANGS, CRASHES_FREED, CRASHES_TERMINATED, EXITS_FREED, MOVES, ROUNDS, PAINTS, INTERRUPTS,
     BOUNDS, OVERWRITES, WARNS, HANGS_FREED, HANGS_TERMINATED, FAILS_TERMINATED, CLOSES, DEAFENS, LOCALISES,
-    SETS_VARIABLE, HANDLES, LOWERS_LIMITS, MASKS,
+    SETS_VARIABLE, HANDLES, LOWERS_LIMITS, MASKS, CLOSES_OPENED, CLOSES_ALL,
 };
 #define BOUND 0.3 /* of BOUNDS: `at` is no later */
 
@@ -68,6 +68,11 @@ static void lower_limit(void) {
     setrlimit(RLIMIT_NOFILE, &limit);
 }
 
+static void close_from(int first) {
+    for (int i = first; i < 1024; i++)
+        close(i);
+}
+
 static void do_harm(Host *host, int deed) {
     switch (deed) {
     case EXITS: exit(0);
@@ -84,6 +89,8 @@ static void do_harm(Host *host, int deed) {
     case HANDLES: signal(SIGUSR2, SIG_IGN); break;
     case LOWERS_LIMITS: lower_limit(); break;
     case MASKS: umask(0777); break;
+    case CLOSES_OPENED: close_from(3); break;
+    case CLOSES_ALL: close_from(0); break;
     case INTERRUPTS: kill(getpid(), SIGINT); break;
     default: break;
     }
