@@ -8,6 +8,7 @@ from typing import Any
 from fmpy.model_description import CoSimulation, ModelDescription
 
 from fmus.fmi.standard import MODEL_EXCHANGE, STEPPED, Interface, fmi_version
+from fmus.fmi.types import is_continuous
 
 
 class SolvedCoSimulation(CoSimulation):  # type: ignore[misc]
@@ -21,6 +22,19 @@ def is_solved(description: ModelDescription) -> bool:
         description: of the slave.
     """
     return isinstance(description.coSimulation, SolvedCoSimulation)
+
+
+def hides_nothing(description: ModelDescription) -> bool:
+    """Whether nothing is declared that an event changes, so that time, states and inputs may be all of the state.
+
+    Args:
+        description: of the FMU.
+    """
+    if fmi_version(description) == 1 or description.numberOfEventIndicators:
+        return False
+    own = [v for v in description.modelVariables if v.causality not in ("input", "parameter", "structuralParameter")]
+    changing = [v for v in own if v.variability not in ("constant", "fixed") and v.causality != "independent"]
+    return all(is_continuous(v) for v in changing) and not any(v.type == "Clock" for v in description.modelVariables)
 
 
 def stepped_by(description: ModelDescription, interface: Interface | None = None) -> str | None:
@@ -49,13 +63,15 @@ def as_stepped(description: ModelDescription, interface: Interface | None = None
         for name in (
             "needsExecutionTool",
             "canBeInstantiatedOnlyOncePerProcess",
-            "canGetAndSetFMUstate",
             "providesDirectionalDerivative",
             "providesAdjointDerivatives",
             "canNotUseMemoryManagementFunctions",
             "providesPerElementDependencies",
         )
     }
+    saves = getattr(own, "canGetAndSetFMUstate", False)
+    shared["canGetAndSetFMUstate"] = saves or hides_nothing(description)
+    shared["canSerializeFMUstate"] = saves and getattr(own, "canSerializeFMUstate", False)
     stepped = copy(description)
     in_events = version == 3
     stepped.coSimulation = SolvedCoSimulation(

@@ -63,7 +63,7 @@ class Motion:
     """
 
     def __init__(self, model: ModelCalls, tolerance: float, method: Method, state_name: Callable[[int], str]) -> None:
-        self._model, self._state_name = model, state_name
+        self._model, self.state_name = model, state_name
         nominals = np.ones(max(model.state_count, 1))
         self.solver = Cvode(
             len(nominals),
@@ -89,6 +89,8 @@ class Motion:
         """Initialisation has just ended: it stands in Event Mode."""
         self.in_event_mode, self.terminated, self.next_event = True, False, NEVER
         self._last_event, self._at_once = -NEVER, 0
+        self.events = 0
+        """How many happened on the way, those of inputs left out."""
         self._rooted = self._met = False
         self.begin_anew()
 
@@ -221,6 +223,19 @@ class Motion:
                 return _StepEnd(until, event=False, terminate=False)
         raise _too_many(t)
 
+    def states(self) -> np.ndarray:
+        """Continuous states where it stands, shape (n,)."""
+        found = np.zeros(self._model.state_count)
+        self._model.states((ctypes.c_double * len(found)).from_address(found.ctypes.data))
+        return found
+
+    def put(self, t: float, states: np.ndarray) -> None:
+        """To an instant [s] and continuous states, shape (n,), in Continuous-Time Mode."""
+        if self.in_event_mode:
+            self.settle()
+        self._model.move(t, (ctypes.c_double * len(states)).from_address(states.ctypes.data))
+        self.begin_anew()
+
     def look(self, t: float) -> None:
         """Put the FMU at an instant within the last internal step [s], in states from the solver's polynomial."""
         self._model.move(t, self.solver.address(self.solver.between(t)))
@@ -286,7 +301,7 @@ class Motion:
             self._model.after_native(self.solver.native, refused=False)
         refused, self._model.failed = self._model.failed, None
         known = error.worst is not None and self._model.state_count
-        worst = f"; it is worst for {self._state_name(error.worst or 0)}" if known else ""
+        worst = f"; it is worst for {self.state_name(error.worst or 0)}" if known else ""
         why = f" ({str(refused).rstrip('.')})" if refused is not None else ""
         words = f"the solver (CVODE) gives up at t = {t:.12g} s: {error}{why}{worst}"
         return SolverError(words, status=ERROR if refused is None else refused.status)
@@ -299,6 +314,7 @@ class Motion:
         return "asked for after a step of the solver" if self._met else "announced by the FMU"
 
     def _count_event(self, t: float) -> None:
+        self.events += 1
         close = abs(t - self._last_event) <= TIME_TOLERANCE
         self._at_once = self._at_once + 1 if close else 1
         self._last_event = t

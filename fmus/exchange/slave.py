@@ -12,17 +12,17 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import count
 from typing import Any
 
+import numpy as np
 from fmpy.fmi1 import FMICallException, fmi1EventInfo
 from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 from fmpy.model_description import ModelDescription
 
 from fmus.exchange.cvode import SolverError
 from fmus.exchange.model_calls import EventIteration
-from fmus.exchange.motion import Motion, MotionState, Part, motion_of
+from fmus.exchange.motion import Motion, Part, motion_of
+from fmus.exchange.states import Sent, StoredStates
 from fmus.fmi.standard import DISCARD, ERROR, NEVER, OK, TIME_TOLERANCE, WARNING, Method, fmi_version
 from fmus.fmi.types import BOOLEANS, CTYPES
 
@@ -35,15 +35,6 @@ _STEPS: dict[int, tuple[Any, ...]] = {
     3: (ctypes.c_double, ctypes.c_double, ctypes.c_bool, *[ctypes.c_void_p] * 4),
 }
 """Arguments of doStep behind the instance, by version."""
-
-
-@dataclass(frozen=True)
-class _Saved:
-    """A state: what the FMU gave, and what stands beside it."""
-
-    held: ctypes.c_void_p
-    sent: dict[tuple[str, bytes], bytes]
-    motion: MotionState
 
 
 class CoSimulationFunctions:
@@ -59,9 +50,8 @@ class CoSimulationFunctions:
         self._version, self._functions = fmi_version(description), dict(slave._functions)
         self.motion: Motion | None = None
         self.tolerance, self.reached, self._start = TOLERANCE, 0.0, 0.0
-        self._sent = dict[tuple[str, bytes], bytes]()
-        self._saved, self._numbers = dict[int, _Saved](), count(1)
-        self._kept: list[Any] = []
+        self.sent, self.length, self._widths = Sent(), 0.0, dict[str, int]()
+        self._kept, self._library = list[Any](), dict[str, Any]()
         for name, install in self._names().items():
             self._install(f"fmi{self._version}{name}", *install)
         for name in [n for n in self._functions if n[4:7] == "Set" and n[7:] in {*CTYPES, "Boolean"}]:
@@ -158,12 +148,13 @@ class CoSimulationFunctions:
     def _step(self, _call: Any, _instance: Any, t: float, h: float, _past: Any, *results: int) -> int:
         if self._version == 3:
             return self._step_to_event(t, t + h, *results)
-        end = self._motion.step(t, t + h)
+        self.length, end = h, self._motion.step(t, t + h)
         self.reached = end.time
         return DISCARD if end.terminate else OK
 
     def _step_to_event(self, t: float, until: float, event: int, terminate: int, early: int, reached: int) -> int:
         """To the first event, or in one that does not declare early returns to an event at the very end."""
+        self.length = until - t
         end = self._motion.advance(t, until, returns=self._description.coSimulation.mightReturnEarlyFromDoStep)
         returned = until - end.time > TIME_TOLERANCE
         for address, said in ((event, end.event), (terminate, end.terminate), (early, returned)):
@@ -178,20 +169,21 @@ class CoSimulationFunctions:
         kind = name[7:]
         held = (BOOLEANS[self._version] if kind == "Boolean" else CTYPES[kind])[0]
         width, of_values = ctypes.sizeof(held), self._version == 3
+        self._widths[name] = width
 
         def set_values(
             call: Callable[..., int], instance: Any, references: int, n: int, values: int, *more: int
         ) -> int:
             key = name, ctypes.string_at(references, 4 * n)
             content = ctypes.string_at(values, width * (more[0] if of_values else n))
-            if self._sent.get(key) == content:
+            if self.sent.get(key) == content:
                 return OK
             if self.motion is not None:
                 self.motion.enter_event_mode()
             status = call(instance, references, n, values, *more)
             if status <= WARNING:
                 self._forget_overlapping(key)
-                self._sent[key] = content
+                self.sent[key] = content
             return status
 
         return set_values
@@ -200,9 +192,9 @@ class CoSimulationFunctions:
         """What other groups of variables were set to, as far as they share one with this group."""
         name, references = key
         own = set(memoryview(references).cast("I"))
-        for other in [k for k in self._sent if k != key and k[0] == name]:
+        for other in [k for k in self.sent if k != key and k[0] == name]:
             if not own.isdisjoint(memoryview(other[1]).cast("I")):
-                del self._sent[other]
+                del self.sent[other]
 
     # -- events of FMI 3, which the master handles ---------------------------------------------------------------------
 
@@ -221,33 +213,41 @@ class CoSimulationFunctions:
         self._motion.note(EventIteration(again, terminate, due))
         return status
 
-    # -- states -----------------------------------------------------------------------------------------------------
+    # -- states, see `states.StoredStates` -----------------------------------------------------------------------------
 
-    def _save(self, call: Callable[..., int], instance: Any, place: int) -> int:
-        """What follows begins anew, as it does once this state is restored."""
-        motion, held = self._motion, ctypes.c_void_p()
-        status = call(instance, ctypes.addressof(held))
-        if status <= WARNING:
-            number = next(self._numbers)
-            self._saved[number] = _Saved(held, dict(self._sent), motion.state())
-            ctypes.c_void_p.from_address(place).value = number
-        return status
+    @property
+    def moved(self) -> Motion:
+        """What moves it."""
+        return self._motion
 
-    def _restore(self, call: Callable[..., int], instance: Any, number: int) -> int:
-        saved, motion = self._saved[number], self._motion
-        status = call(instance, saved.held.value)
-        self._sent = dict(saved.sent)
-        motion.restore(saved.motion)
-        return status
+    def put(self, key: tuple[str, bytes], content: bytes) -> None:
+        """Set variables as they were, through Event Mode.
 
-    def _release(self, call: Callable[..., int], instance: Any, place: int) -> int:
-        pointer = ctypes.c_void_p.from_address(place)
-        saved = self._saved.pop(pointer.value or 0, None)
-        pointer.value = None
-        return OK if saved is None else call(instance, ctypes.addressof(saved.held))
+        Args:
+            key: function and value references. content: values as C has them.
+        """
+        name, references = key
+        self._motion.enter_event_mode()
+        held, values = (ctypes.create_string_buffer(kept, len(kept)) for kept in (references, content))
+        more = (len(content) // self._widths[name],) if self._version == 3 else ()
+        places = ctypes.addressof(held), len(references) // 4, ctypes.addressof(values)
+        status = self._library[name](self._slave.component, *places, *more)
+        if status > WARNING:
+            raise FMICallException(name, status)
+        self._forget_overlapping(key)
+        self.sent[key] = content
+
+    def get_reals(self, references: Sequence[int]) -> np.ndarray:
+        """Real scalars, shape (n,).
+
+        Args:
+            references: of them.
+        """
+        get = self._slave.getReal if self._version == 2 else self._slave.getFloat64
+        return np.array(get(list(references)) if references else [], dtype=float)
 
     def _reset(self, call: Callable[..., int], instance: Any) -> int:
-        self.motion, self._sent = None, {}
+        self.motion, self.sent = None, {}
         return call(instance)
 
     # -- installation -----------------------------------------------------------------------------------------------
@@ -260,17 +260,15 @@ class CoSimulationFunctions:
         pointer, step = ctypes.c_void_p, {"DoStep": (self._step, *_STEPS[self._version])}
         if self._version == 1:
             return step
-        word = "FMUstate" if self._version == 2 else "FMUState"
         flag: Any = ctypes.c_int if self._version == 2 else ctypes.c_bool
         begin = "SetupExperiment" if self._version == 2 else "EnterInitializationMode"
         common: dict[str, tuple[Any, ...]] = {
             begin: (self._set_up, flag, ctypes.c_double, ctypes.c_double, flag, ctypes.c_double),
             "ExitInitializationMode": (self._initialised,),
             "Reset": (self._reset,),
-            f"Get{word}": (self._save, pointer),
-            f"Set{word}": (self._restore, pointer),
-            f"Free{word}": (self._release, pointer),
         }
+        if self._description.coSimulation.canGetAndSetFMUstate:
+            common |= StoredStates(self, self._description).functions(self._version)
         if self._version == 2:
             return step | common
         return (
@@ -293,6 +291,7 @@ class CoSimulationFunctions:
         prototype = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *types)
         own = self._functions.get(name)
         library = None if own is None else prototype(ctypes.cast(own, ctypes.c_void_p).value or 0)
+        self._library[name] = library
 
         def called(*arguments: Any) -> int:
             self._slave.reason = ""

@@ -11,7 +11,7 @@ from fmus.toolchain.compile import library_name
 from fmus.toolchain.platforms import host_platform
 
 STATES = {"DECAY": 1, "BALL": 2, "TRAIN": 2, "STAIR": 0, "STEPS": 1, "CHATTERS": 0, "UNSETTLED": 0, "ESCAPES": 2}
-STATES |= {"REFUSES": 1, "OSCILLATES": 2, "REACTION": 2}
+STATES |= {"REFUSES": 1, "OSCILLATES": 2, "REACTION": 2, "REMEMBERS": 1}
 SLOPES = ("OSCILLATES", "REACTION")
 """Those that have directional derivatives."""
 INDICATORS = {"BALL": 1}
@@ -20,6 +20,7 @@ COUNT = (
     '<ScalarVariable name="count" valueReference="6" causality="output" variability="discrete"><Integer/>'
     "</ScalarVariable>"
 )
+COUNT_3 = '<Int32 name="count" valueReference="6" causality="output"/>'
 UNITS = (
     '<UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit><Unit name="m/s"><BaseUnit m="1" s="-1"/></Unit>'
     "</UnitDefinitions>"
@@ -27,23 +28,43 @@ UNITS = (
 
 
 def exchange_fmu(
-    folder: Path, model: str, version: int = 2, *, saves: bool = True, units: bool = False, lie: str = ""
+    folder: Path,
+    model: str,
+    version: int = 2,
+    *,
+    saves: bool = True,
+    units: bool = False,
+    lie: str = "",
+    counts: bool = True,
 ) -> Path:
     """A model exchange FMU.
 
     Args:
         folder: where it goes. model: a MODEL_... macro without the prefix. version: of FMI.
         saves: whether it declares that its state can be saved. units: whether its variables have units.
-        lie: a LIE_... macro without the prefix.
+        lie: a LIE_... macro without the prefix. counts: whether the description has the count, which is discrete.
     """
     folder.mkdir(parents=True, exist_ok=True)
     library = compiled("exchange.c", f"#define VERSION {version}\n#define MODEL_{model}\n#define LIE_{lie}\n", "fmu")
     platform = host_platform()
     content = {
-        "modelDescription.xml": _DESCRIPTIONS[version](model, saves, units).encode(),
+        "modelDescription.xml": _described(model, version, saves, units, counts).encode(),
         f"binaries/{platform.fmi2_folder if version < 3 else platform.name}/{library_name('fmu')}": library,
     }
     return pack_fmu(content, folder / f"{model.lower()}{version}.fmu")
+
+
+def _described(model: str, version: int, saves: bool, units: bool, counts: bool) -> str:
+    """The description; without the count the variables behind it have other places."""
+    text = _DESCRIPTIONS[version](model, saves, units)
+    if counts:
+        return text
+    n = STATES[model]
+    for dropped in (COUNT, f'<Unknown index="{n + 2}"/>', COUNT_3, '<Output valueReference="6"/>'):
+        text = text.replace(dropped, "")
+    for i in range(n):
+        text = text.replace(f'<Unknown index="{n + 3 + i}"/>', f'<Unknown index="{n + 2 + i}"/>')
+    return text
 
 
 def _unit(index: int, units: bool) -> str:
@@ -114,7 +135,7 @@ def _third(model: str, saves: bool, units: bool) -> str:
   <DefaultExperiment startTime="0" stopTime="3"/>
   <ModelVariables><Float64 name="time" valueReference="99" causality="independent" variability="continuous"/>{outputs}
     <Float64 name="input" valueReference="3" causality="input" start="0"/>
-    <Int32 name="count" valueReference="6" causality="output"/>{rates}
+    {COUNT_3}{rates}
   </ModelVariables>
   <ModelStructure>{"".join(f'<Output valueReference="{i + 1}"/>' for i in range(n))}<Output valueReference="6"/>
     {listed}{indicators}</ModelStructure>

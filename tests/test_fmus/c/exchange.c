@@ -132,6 +132,17 @@ static double slope(Model *m, unsigned rate, unsigned state) {
 static void indicate(Model *m, double *z) {}
 static bool iterate(Model *m) { return false; }
 
+#elif defined(MODEL_REMEMBERS) /* dx/dt = -x + the largest input that it saw, which no variable shows */
+#define STATES 1
+#define INDICATORS 0
+static void start(Model *m) { m->x[0] = 1.0; }
+static int rates(Model *m, double *dx) { dx[0] = m->count - m->x[0]; return 0; }
+static void indicate(Model *m, double *z) {}
+static bool iterate(Model *m) {
+    if (m->u > m->count) m->count = (int)m->u;
+    return false;
+}
+
 #else /* MODEL_REFUSES: its derivatives are an error from 0.5 s on */
 #define STATES 1
 #define INDICATORS 0
