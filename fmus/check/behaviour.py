@@ -12,8 +12,11 @@ import numpy as np
 from fmus.check.runner import WARM_UP_STEPS, Runner, elsewhere
 
 STEP_TOLERANCE = 0.01
-"""A divided step may differ from a whole one by this share of the change: far above any integration error, far below a
-lie.
+"""A divided step may differ from a whole one by this share of the output's range over the last few steps: far above
+any integration error, far below a lie, which errs by a good part of a step.
+
+A share of the change alone says nothing: around a standstill or a steady state outputs creep, and what their last
+digits do is the integrator's.
 """
 
 UNEVEN = 0.3137
@@ -22,13 +25,18 @@ UNEVEN = 0.3137
 MICRO = 1e-4
 """A step of this share of the whole one must move the outputs, and by about that share of the change."""
 
+_LARGER, _SMALLER = 1e-2, 1e-8
+"""Where nothing moves in that, one of the first share must: own steps of an FMU that are finer do not matter. Where too
+much moves, one of the second must move less: the FMU may be fast against the whole step.
+"""
+
 _MICRO_EXCESS = 20.0
 """By how much more a tiny step may move an output than its share: an output may start to move faster than on
 average.
 """
 
 _ENOUGH = 0.5
-"""Share of the moving outputs that must behave; a sampled one among them need not move in a tiny step."""
+"""Share of the moving outputs that must behave."""
 
 RESOLUTION = 1e-9
 """An output that changes by less than this share of itself over a step does not move."""
@@ -56,11 +64,13 @@ def divided_steps(runner: Runner, scale: float = 1.0) -> str:
         scale: the whole step, in communication steps of the runner.
     """
     h = scale * runner.h
-    start, whole, *all_divided = ends_of_divided_steps(runner, h)
-    change = np.abs(whole - start)
-    moving = change > RESOLUTION * np.abs(whole)
-    for parts, divided in zip(_DIVISIONS, all_divided, strict=True):
-        equal = np.abs(divided - whole) <= STEP_TOLERANCE * change + RESOLUTION * np.abs(whole)
+    rows = _rows(runner, (h,))
+    start, whole = rows[-2:]
+    moving = np.abs(whole - start) > RESOLUTION * np.abs(whole)
+    floor = _floor(rows)
+    for parts in _DIVISIONS:
+        divided = _rows(runner, [h * part for part in parts])[-1]
+        equal = np.abs(divided - whole) <= floor
         if not _enough(equal, moving):
             shares = " and ".join(f"{part:g}" for part in parts)
             found = worst(runner, whole, divided)
@@ -74,13 +84,22 @@ def ends_of_divided_steps(runner: Runner, h: float) -> list[np.ndarray]:
     Args:
         runner: the instance under test.
     """
-    warm_up = (runner.h,) * WARM_UP_STEPS
-    runner.begin()
-    rows = runner.steps((*warm_up, h))[-2:]
-    for parts in _DIVISIONS:
-        runner.begin()
-        rows.append(runner.steps((*warm_up, *(h * part for part in parts)))[-1])
-    return rows
+    return [*_rows(runner, (h,))[-2:], *(_rows(runner, [h * part for part in parts])[-1] for parts in _DIVISIONS)]
+
+
+def _rows(runner: Runner, path: Sequence[float]) -> np.ndarray:
+    """Outputs from the start on, after each step of the warm-up and of `path` [s], shape (k, q)."""
+    return np.array([runner.begin(), *runner.steps(((runner.h,) * WARM_UP_STEPS) + tuple(path))])
+
+
+def _floor(rows: np.ndarray) -> np.ndarray:
+    """What is nothing beside the movement of each output, shape (q,), in rows of shape (k, q) from the start on."""
+    return np.asarray(RESOLUTION * np.abs(rows[-1]) + STEP_TOLERANCE * _range(rows))
+
+
+def _range(rows: np.ndarray) -> np.ndarray:
+    """The range of each output, shape (q,); without the first row, as some FMUs compute outputs in steps only."""
+    return np.asarray(np.ptp(rows[1:], axis=0))
 
 
 def short_step(runner: Runner) -> str:
@@ -89,20 +108,29 @@ def short_step(runner: Runner) -> str:
     Args:
         runner: the instance under test.
     """
-    h, warm_up = runner.h, (runner.h,) * WARM_UP_STEPS
-    runner.begin()
-    start, whole = runner.steps((*warm_up, h))[-2:]
-    change = np.abs(whole - start)
-    moving = (change > RESOLUTION * np.abs(whole)) & ~runner.discrete  # a discrete output moves at events only
-    runner.begin()
-    at = np.array(runner.steps((*warm_up, h * UNEVEN, h * MICRO, h * MICRO))[-3:])
-    moved = np.abs(np.diff(at, axis=0))
-    small = np.all((moved > 0.0) & (moved <= _MICRO_EXCESS * MICRO * change), axis=0)
-    if not moving.any() or _enough(small, moving):
-        return ""
-    still = bool(np.all(moved[:, moving & ~small] == 0.0))
+    rows = _rows(runner, (runner.h, runner.h))
+    problem, other = _tiny_step(runner, rows, MICRO)
+    return problem and _tiny_step(runner, rows, other)[0] and problem
+
+
+def _tiny_step(runner: Runner, rows: np.ndarray, share: float) -> tuple[str, float]:
+    """What is wrong with two tiny steps after a short one, in words, and the share of others that may go well.
+
+    Args:
+        runner: the instance under test.
+        rows: outputs from the start up to the end of two whole steps, shape (k, q). share: of the first of these.
+    """
+    h, changes = runner.h, np.abs(np.diff(rows[-3:], axis=0))
+    moving = np.all(changes > _floor(rows), axis=0)  # what stopped within the first step need not move in it
+    moved = np.abs(np.diff(_rows(runner, (h * UNEVEN, h * share, h * share))[-3:], axis=0))
+    seen = _MICRO_EXCESS * (share * changes[0] + MICRO * _range(rows))
+    good = np.all((moved > 0.0) & (moved <= seen), axis=0) | runner.discrete  # which moves at events only
+    if not moving.any() or _enough(good, moving):
+        return "", share
+    still = bool(np.all(moved[:, moving & ~good] == 0.0))
     what = "nothing moves in it" if still else "it moves the outputs by more than its share"
-    return f"the outputs differ: after a step of {h * UNEVEN:g} s a tiny one of {h * MICRO:g} s is not done, {what}"
+    tiny = f"the outputs differ: after a step of {h * UNEVEN:g} s a tiny one of {h * share:g} s is not done, {what}"
+    return tiny, _LARGER if still else _SMALLER
 
 
 def honest_step(runner: Runner) -> str:

@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from plant_models.hybrid import Array, HybridSystem, Signal, input_signal, memory, output_signal, state
 from plant_models.hybrid.option import require_chosen
+from plant_models.hybrid.signal import Variability
 from plant_models.railway.traction.motor_equations import (
     AXES,
     FRAMES,
@@ -61,6 +63,7 @@ class SynchronousMotor(HybridSystem):
     internal_step = 1e-4
     bounded_parameters = "all"
     state_signal: ClassVar[Callable[..., Signal]] = staticmethod(state)
+    _outputs_are: ClassVar[Variability] = "continuous"
     parameters: tuple[Signal, ...] = MOTOR_PARAMETERS
     presets = {"exact": {}, "traction_200kw": TRACTION_200_KW}
     default_preset = "exact"
@@ -80,7 +83,8 @@ class SynchronousMotor(HybridSystem):
             self.state_signal("electrical_angle", "rad", 0.0, "Electrical angle of the rotor"),
             *(_measured_memory(frame) if self.sampled else ()),
         )
-        self.inputs, self.outputs = _motor_inputs(frame), _motor_outputs(frame)
+        self.inputs = _motor_inputs(frame)
+        self.outputs = tuple(replace(signal, variability=self._outputs_are) for signal in _motor_outputs(frame))
         super().__init__(**{option: value for option, value in chosen.items() if option in self.option_choices})
 
     def flow(self, t: Array, x: Any, u: Any, p: Any) -> dict[str, Array]:
@@ -145,6 +149,7 @@ class SynchronousMotorEuler(SynchronousMotor):
     source = 'Allaoui 2024, "3.39"-"3.41" (4.39-4.41), section III.3'
     internal_step = 1e-2  # nothing flows
     state_signal: ClassVar[Callable[..., Signal]] = staticmethod(memory)
+    _outputs_are = "discrete"  # they follow from what is held between updates
     events = (sampling_event("update"),)
     presets = {
         "as_published": PUBLISHED_NOISE,

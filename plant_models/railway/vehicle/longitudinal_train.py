@@ -5,6 +5,7 @@ Euler steps.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -165,6 +166,10 @@ _TRAIN_PRESETS: dict[str, Mapping[str, Any]] = {
 """Presets of the trains: Davis sets A to F, and set B on the grade ``0.05 sin(0.1 t)`` of section 3.3.4 at 45 m/s."""
 
 
+_HELD = ("position", "speed", "wheel_speed")
+"""What follows from the state alone, which stands between updates; other outputs follow inputs and time too."""
+
+
 class LongitudinalTrainEuler(_LongitudinalForces):
     """Train as one point in discrete time: ``x(k+1) = (I + A(x(k)) Dt) x(k) - Dt B_B u_B + Dt B_T u_T + Dt G(x(k))``.
 
@@ -189,6 +194,10 @@ class LongitudinalTrainEuler(_LongitudinalForces):
         memory("train_position", "m", 0.0, "Position of the train at start"),
         memory("train_speed", "m/s", 0.0, "Speed of the train at start"),
         memory("updating", "1", 0.0, "1 from the start on, where nothing is updated yet"),
+    )
+    outputs = (
+        *(signal for signal in _LongitudinalForces.outputs if signal.name not in _HELD),
+        *(replace(s, variability="discrete") for s in _LongitudinalForces.outputs if s.name in _HELD),
     )
     own_parameters = (parameter("update_period", "s", 0.05, "Time between two updates Dt", min=1e-6),)
     events = (PeriodicEvent("update", "update_period", description="The state is updated"),)
