@@ -176,11 +176,11 @@ def parse_scenario(data: dict[str, Any], where: str, folder: Path | None = None)
     """
     try:
         return ScenarioTable.model_validate(data, context={"folder": folder})
-    except ValidationError as error:
+    except ValidationError as error:  # its own account would stand above the words in a script
         if not data.get("components") and not _REQUIRED & data.keys():
             expected = "expected stop = 60.0, step = 0.01, and a table [components.NAME] for each component"
-            raise ScenarioError(f"{where} holds no scenario; {expected}.") from error
-        raise ScenarioError(_in_words(error, where)) from error
+            raise ScenarioError(f"{where} holds no scenario; {expected}.") from None
+        raise ScenarioError(_in_words(error, where)) from None
 
 
 def parse_part(data: Mapping[str, Any], where: str, folder: Path | None = None, at: tuple[str | int, ...] = ()) -> Any:
@@ -202,7 +202,7 @@ def parse_part(data: Mapping[str, Any], where: str, folder: Path | None = None, 
     except ValidationError as error:
         text = _in_words(error, where, at)
         if text:
-            raise ScenarioError(text) from error
+            raise ScenarioError(text) from None
     return None
 
 
