@@ -199,6 +199,7 @@ def schema_tables() -> dict[str, Any]:
         "scenario": schema.ScenarioTable,
         "component": tables.ComponentTable,
         "filter": FilterTable,
+        "limits": tables.LimitsTable,
         "connection": tables.ConnectionTable,
         "master": tables.MasterTable,
         "iteration": tables.IterationTable,

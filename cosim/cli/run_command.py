@@ -74,6 +74,14 @@ ARGUMENTS = (
         help="seed of the run: all chance",
     ),
     argument(
+        "--isolate",
+        action="append",
+        type="master.isolate={}".format,
+        dest="settings",
+        metavar="WHAT",
+        help="component: each FMU by path gets a process of its own, which a crash takes along; no: none does",
+    ),
+    argument(
         "--seeds",
         type=positive,
         metavar="N",

@@ -36,6 +36,8 @@ from fmus.fmi.fmi2 import FMI2Slave
 from fmus.fmi.library import load
 from fmus.fmi.standard import CO_SIMULATION, Interface, Method, fmi_version
 from fmus.fmi.surroundings import Surroundings
+from fmus.isolation.library import load_isolated
+from fmus.isolation.limits import OwnProcess
 from plant_models.hybrid import HybridSystem, TracingError
 
 _LINK_MAP = 2  # dlinfo: RTLD_DI_LINKMAP
@@ -209,6 +211,7 @@ def load_fmu(
     units: Mapping[str, StatedUnit] = NONE_STATED,
     interface: Interface | None = None,
     method: Method = "bdf",
+    isolation: OwnProcess | None = None,
 ) -> Component:
     """Unpack an FMU and prepare an instance of it.
 
@@ -219,6 +222,7 @@ def load_fmu(
         units: what the scenario states of its variables, by name.
         interface: which one is stepped; None for co-simulation, and model exchange where there is nothing else.
         method: of the solver that moves a model exchange FMU.
+        isolation: of an FMU that gets a process of its own; None for one in this process.
 
     Raises:
         FmuLoadError: the file is missing or broken, has no such interface, or no library for this platform.
@@ -234,7 +238,7 @@ def load_fmu(
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
     guard_exit()
-    folder, slave, changed = _loaded_in_peace(archive, path, name, kind)
+    folder, slave, changed = _loaded_in_peace(archive, path, name, kind, isolation)
     more = {"negated": negated_aliases(folder)} if fmi_version(description) == 1 else {}
     component: Component = COMPONENTS[fmi_version(description)](
         name,
@@ -252,7 +256,9 @@ def load_fmu(
     return component
 
 
-def _loaded_in_peace(archive: Archive, path: Path, name: str, kind: str) -> tuple[Path, Any, Sequence[str]]:
+def _loaded_in_peace(
+    archive: Archive, path: Path, name: str, kind: str, isolation: OwnProcess | None
+) -> tuple[Path, Any, Sequence[str]]:
     """As `_unpacked_and_loaded`, and what the library changed for the whole process when it was loaded; it is put back.
 
     Args:
@@ -261,14 +267,16 @@ def _loaded_in_peace(archive: Archive, path: Path, name: str, kind: str) -> tupl
     here, before = Path.cwd(), Surroundings()
     changed: Sequence[str] = ()
     try:
-        folder, slave = _unpacked_and_loaded(archive, path, name, kind)
+        folder, slave = _unpacked_and_loaded(archive, path, name, kind, isolation)
     finally:
         os.chdir(here)  # fmpy changes it while it loads, and leaves it so when it fails
         changed = before.put_back()
     return folder, slave, changed
 
 
-def _unpacked_and_loaded(archive: Archive, path: Path, name: str, kind: str) -> tuple[Path, Any]:
+def _unpacked_and_loaded(
+    archive: Archive, path: Path, name: str, kind: str, isolation: OwnProcess | None
+) -> tuple[Path, Any]:
     """The folder into which an FMU is unpacked, and fmpy's slave with its library loaded; no folder is left on failure.
 
     Args:
@@ -280,8 +288,12 @@ def _unpacked_and_loaded(archive: Archive, path: Path, name: str, kind: str) -> 
     folder: Path | None = None
     try:
         folder = unpack(archive)
-        _refuse_foreign_libraries(_library(folder, archive.description, kind), path, name)
+        if isolation is None:
+            _refuse_foreign_libraries(_library(folder, archive.description, kind), path, name)
         with LAST_CALL.making(name, "loading its library"):
+            if isolation is not None:
+                limit = LAST_CALL.limit_address
+                return folder, load_isolated(folder, archive.description, kind, name, isolation, limit)
             return folder, load(folder, archive.description, kind, name, complete=True)
     except Exception as error:
         if folder is not None:

@@ -66,6 +66,11 @@ class LastCall:
 
         return ctypes.addressof(ctypes.c_char.from_buffer(self.memory))
 
+    @property
+    def limit_address(self) -> int:
+        """Where the longest time of a call is, for C: a double [s], 0 for any time."""
+        return self.address + 8 * LIMIT
+
     # -- who calls --------------------------------------------------------------------------------------------------
 
     def number(self, component: str, what: str) -> int:

@@ -22,9 +22,10 @@ from cosim.errors import ScenarioError, nearest
 from cosim.run.backends import FAULTS, Notify, Realised, Request, cannot_build, realise
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.paths import absolute, move_option_files
-from cosim.scenario.scenario_tables import Backend, ComponentTable
+from cosim.scenario.scenario_tables import Backend, ComponentTable, Isolate
 from fmu_observer.event_protocol import EventProtocol
 from fmu_observer.observers.parameter_values import parameter_values
+from fmus.isolation.limits import OwnProcess
 from plant_models.hybrid import HybridSystem
 from plant_models.hybrid.option import MemberNames
 from plant_models.local_files import files_digest
@@ -104,6 +105,7 @@ def component_factories(
     notify: Notify,
     span: tuple[float, float],
     tolerance: float | str | None = None,
+    isolate: Isolate | None = None,
 ) -> tuple[dict[str, Callable[[], Component]], list[str]]:
     """For each component a function that makes a fresh one, called once for the run and perhaps once for the probe; and
     notes.
@@ -113,6 +115,7 @@ def component_factories(
         notify: called for each FMU that is built. span: start and stop of the run [s], which recordings must cover.
         tolerance: of the FMUs whose table says nothing else; see
             `cosim.components.described.Described.choose_tolerance`.
+        isolate: what of the FMUs whose table says nothing else runs in a process of its own.
 
     Raises:
         ScenarioError, FmuLoadError: a component cannot be made.
@@ -129,7 +132,7 @@ def component_factories(
         elif name in systems:
             factories[name] = _of_system(name, table, systems[name], made)
         else:
-            factories[name] = _of_file(name, table, folder, places[name], tolerance)
+            factories[name] = _of_file(name, table, folder, places[name], tolerance, isolate)
         if table.can_be_missing:
             factories[name] = partial(_declared, factories[name], table.can_be_missing, places[name])
     return factories, made.notes
@@ -143,7 +146,12 @@ def _of_system(name: str, table: ComponentTable, system: HybridSystem, made: Rea
 
 
 def _of_file(
-    name: str, table: ComponentTable, folder: Path, where: str, tolerance: float | str | None
+    name: str,
+    table: ComponentTable,
+    folder: Path,
+    where: str,
+    tolerance: float | str | None,
+    isolate: Isolate | None,
 ) -> Callable[[], Component]:
     """Makes a component of an FMU by path, of a filter over one, or of plain Python."""
     if table.filter is not None:
@@ -152,7 +160,13 @@ def _of_file(
         return partial(python_component, name, table, where)
     chosen = tolerance if table.tolerance is None else table.tolerance
     path = (folder / table.fmu).resolve()
-    return partial(load_fmu, path, name, chosen, table.units, table.interface, table.method)
+    apart = _isolation(table) if (table.isolate or isolate) == "component" else None
+    return partial(load_fmu, path, name, chosen, table.units, table.interface, table.method, apart)
+
+
+def _isolation(table: ComponentTable) -> OwnProcess:
+    """The process of its own that an FMU gets."""
+    return OwnProcess(**table.limits.model_dump()) if table.limits is not None else OwnProcess()
 
 
 def _declared(factory: Callable[[], Component], missing: Sequence[str], where: str) -> Component:

@@ -100,7 +100,9 @@ def load_components(
     """
     table, folder = task.table, task.folder
     span = table.start, table.stop
-    factories, notes = component_factories(table.components, folder, task.where, building, span, table.tolerance)
+    factories, notes = component_factories(
+        table.components, folder, task.where, building, span, table.tolerance, table.master.isolate
+    )
     remarks.note(*notes, *_deviations_of_filters(table, folder))
     files = {name: (folder / t.fmu).resolve() for name, t in table.components.items() if t.fmu is not None}
     _check_instances(files, task.where)

@@ -85,6 +85,20 @@ def _starts(stated: Any) -> Any:
     return {**stated, "seed": _Seed(seed)} if isinstance(seed, float) and not math.isfinite(seed) else stated
 
 
+Isolate = Literal["no", "component"]
+"""What runs in a process of its own."""
+
+
+class LimitsTable(TomlTable):
+    """What the process of an isolated FMU may take."""
+
+    processes: Annotated[int, Field(ge=1)] = 32
+    memory: Annotated[int, Field(ge=1)] = 4 * 1024**3
+    files: Annotated[int, Field(ge=1)] = 1024
+    file_bytes: Annotated[int, Field(ge=1)] = 1024**3
+    output_bytes: Annotated[int, Field(ge=1)] = 64 * 1024
+
+
 _SOLVING = frozenset({"interface", "solver", "method"})
 """Keys of an FMU that say how it is stepped."""
 
@@ -116,6 +130,8 @@ class ComponentTable(TomlTable):
     every: Annotated[int, Field(ge=1)] = 1
     substeps: Annotated[int, Field(ge=1)] = 1
     filter: FilterTable | None = None
+    isolate: Isolate | None = None
+    limits: LimitsTable | None = None
 
     @model_validator(mode="after")
     def _one_origin(self) -> ComponentTable:
@@ -133,6 +149,8 @@ class ComponentTable(TomlTable):
             raise ValueError("'units' belong to an FMU, whose description may lack them")
         if stated != ["fmu"] and self.tolerance is not None:
             raise ValueError("'tolerance' belongs to an FMU; shipped models have the parameter 'internal_step' instead")
+        if (apart := {"isolate", "limits"} & self.model_fields_set) and (stated != ["fmu"] or self.filter is not None):
+            raise ValueError(f"{min(apart)!r} belongs to an FMU by path that is stepped, of which it is said")
         if (solving := _SOLVING & self.model_fields_set) and stated != ["fmu"]:
             raise ValueError(f"{sorted(solving)[0]!r} belongs to an FMU, which a solver moves in model exchange")
         if stated != ["recording"] and {"component", "interpolation"} & self.model_fields_set:
@@ -232,6 +250,7 @@ class MasterTable(TomlTable):
     stepper: Literal["auto", "python", "compiled"] = "auto"
     log_calls: bool = False
     call_timeout: Annotated[float, Field(gt=0.0)] | None = None
+    isolate: Isolate | None = None
     record_every: Annotated[int, Field(ge=1)] = 1
     record_memory: Annotated[float, Field(gt=0.0)] = 256.0
 

@@ -34,6 +34,15 @@ class FilterKeywords(TypedDict, total=False):
     members: int
     seed: int
 
+class LimitsKeywords(TypedDict, total=False):
+    """What the process of an isolated FMU may take."""
+
+    processes: int
+    memory: int
+    files: int
+    file_bytes: int
+    output_bytes: int
+
 class ComponentKeywords(TypedDict, total=False):
     """One component: an FMU by path, or a shipped plant, sensor, driver or observer by name."""
 
@@ -61,6 +70,8 @@ class ComponentKeywords(TypedDict, total=False):
     every: int
     substeps: int
     filter: FilterKeywords | None
+    isolate: Literal["no", "component"] | None
+    limits: LimitsKeywords | None
 
 class FalseTelegramKeywords(TypedDict, total=False):
     """A telegram without a balise."""
@@ -151,6 +162,7 @@ class MasterKeywords(TypedDict, total=False):
     stepper: Literal["auto", "python", "compiled"]
     log_calls: bool
     call_timeout: float | None
+    isolate: Literal["no", "component"] | None
     record_every: int
     record_memory: float
 

@@ -20,6 +20,7 @@ from cosim.scenario.includes import find_file, read_tables
 from cosim.scenario.origin import Origin
 from cosim.scenario.package_names import is_package, stem
 from cosim.scenario.saving import save_scenario, scenario_text
+from cosim.scenario.scenario_tables import Isolate
 from cosim.scenario.shipped import shipped_scenarios
 from cosim.simulation.results_of_others import demand_trust, is_of_results
 from cosim.simulation.scenario_screen import scenario_screen
@@ -108,6 +109,7 @@ class Scenario(StatedScenario, FirstScreen):
         record: Sequence[str] = (),
         name: str = "fmu",
         interpolation: Interpolation | Mapping[str, Interpolation] | None = None,
+        isolate: Isolate | None = None,
     ) -> Scenario:
         """A scenario of one FMU alone: for a look at it, or for a regression test of its outputs.
 
@@ -123,6 +125,7 @@ class Scenario(StatedScenario, FirstScreen):
             name: of the component: its outputs are recorded as ``name.output``.
             interpolation: ``hold`` or ``linear`` for all columns of the table, or for some by name: a command that was
                 logged is held.
+            isolate: ``component`` for a process of its own.
 
         Raises:
             FmuLoadError: the FMU cannot be read.
@@ -131,6 +134,8 @@ class Scenario(StatedScenario, FirstScreen):
         run = FmuAlone(start, stop, step, inputs, parameters, record, interpolation)
         tables, warnings = tables_of_fmu(Path(path), name, run)
         scenario = cls(where=Path(path).name, **tables)
+        if isolate is not None:
+            scenario.master(isolate=isolate)
         scenario._warnings = warnings
         return scenario
 

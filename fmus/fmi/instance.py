@@ -93,8 +93,8 @@ class Instance(Described):
         if self._alive:
             self._alive = False
             self._quietly("freeInstance", self.slave.freeInstance)
-        elif self._loaded and self.slave.component is None:
-            self._quietly("unloading", self.slave.freeLibrary)  # never instantiated: freeInstance did not do it
+        elif self._loaded and (self.slave.component is None or getattr(self.slave, "apart", False)):
+            self._quietly("unloading", self.slave.freeLibrary)  # what freeInstance did not do
         self._loaded = False
         forget(self)
 

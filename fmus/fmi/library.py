@@ -55,7 +55,21 @@ def functions_of_capabilities(description: ModelDescription, interface: str) -> 
             yield from ((capability, f"fmi{fmi_version(description)}{name}".lower()) for name in functions)
 
 
-def load(folder: Path, description: ModelDescription, interface: str, name: str, *, complete: bool = False) -> Any:
+StandIn = tuple[str, Callable[[ctypes.CDLL], Any], type]
+"""A library in place of the FMU's, beside it: its name without the ending, what is called when it is loaded and
+returns what has its functions, and what the object has beside fmpy's calls.
+"""
+
+
+def load(
+    folder: Path,
+    description: ModelDescription,
+    interface: str,
+    name: str,
+    *,
+    complete: bool = False,
+    stand_in: StandIn | None = None,
+) -> Any:
     """An object with fmpy's call surface over the library of an unpacked FMU; not yet instantiated.
 
     Args:
@@ -64,13 +78,18 @@ def load(folder: Path, description: ModelDescription, interface: str, name: str,
         interface: ``coSimulation`` or ``modelExchange``.
         name: instance name.
         complete: whether a library that lacks a function of the standard is refused.
+        stand_in: a library in place of that of the FMU.
 
     Raises:
         Exception: the library cannot be loaded.
     """
     face: Any = FACES[fmi_version(description), interface]
-    face = _complete(face) if complete else _tolerant(face)
     identifier = getattr(description, interface).modelIdentifier
+    if stand_in is not None:
+        identifier, opened, more = stand_in
+        face = _with_functions(face, opened, more)
+    else:
+        face = _complete(face) if complete else _with_functions(face, _Library)
     return face(guid=description.guid, modelIdentifier=identifier, unzipDirectory=str(folder), instanceName=name)
 
 
@@ -108,20 +127,19 @@ class _Library:
             return _Missing(name)
 
 
-def _tolerant(face: type) -> Any:
-    def load_functions(self: Any) -> None:
-        self.dll = _Library(self.dll)
-        _load_functions(face, self)
-
-    return _with_functions(face, load_functions)
-
-
 @cache
 def _complete(face: type) -> Any:
-    return _with_functions(face, lambda slave: _load_functions(face, slave))
+    return _with_functions(face)
 
 
-def _with_functions(face: type, load_functions: Callable[[Any], None]) -> Any:
+def _with_functions(face: type, opened: Callable[[ctypes.CDLL], Any] | None = None, *more: type) -> Any:
+    """A class of fmpy that counts warnings, over what `opened` makes of the library where it is given."""
+
+    def load_functions(self: Any) -> None:
+        if opened is not None:
+            self.dll = opened(self.dll)
+        _load_functions(face, self)
+
     def call(self: Any, name: str, *arguments: Any) -> Any:
         status, function = face._call(self, name, *arguments), self._functions[name]  # type: ignore[attr-defined]
         if status == WARNING and function.restype is ctypes.c_int and isinstance(function, FUNCTION):
@@ -129,7 +147,7 @@ def _with_functions(face: type, load_functions: Callable[[Any], None]) -> Any:
         return status
 
     members = {"_loadFunctions": load_functions, "_call": call, "warned": lambda _self, _name: None}
-    return type(face.__name__, (face,), members)  # fmpy goes by the name of the class
+    return type(face.__name__, (*more, face), members)  # fmpy goes by the name of the class
 
 
 _signatures: dict[type, dict[str, tuple[list[str], list[Any], Any]]] = {}

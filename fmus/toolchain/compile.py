@@ -129,6 +129,24 @@ def compile_library(compiler: Compiler, folder: Path, sources: Sequence[str], li
     return folder / library
 
 
+def compile_program(compiler: Compiler, folder: Path, sources: Sequence[str], program: str) -> Path:
+    """Compile C files into a program for this machine.
+
+    Args:
+        compiler: see `find_compiler`. folder: where the sources lie and the program goes. sources: names of the C
+            files. program: file name of the program.
+
+    Returns:
+        Path of the program.
+
+    Raises:
+        CompilationError: the compiler refused.
+    """
+    flags = [flag for flag in compiler.flags if flag != "-shared"]
+    run_compiler(compiler, folder, [*FLAGS, *flags, *sources, "-o", program, "-lpthread", "-ldl"])
+    return folder / program
+
+
 def run_compiler(compiler: Compiler, folder: Path, words: Sequence[str]) -> None:
     """Run a compiler once.
 
