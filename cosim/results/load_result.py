@@ -120,7 +120,7 @@ def _reader(path: Path, texts: bool) -> Callable[[Path], ResultData]:
     if start.startswith((b"\x89HDF", b"MATLAB 7.3")):
         return FORMATS["hdf5"].read
     if start.startswith(b"MATLAB") or path.suffix.lower() == ".mat":
-        return read_foreign_mat
+        return partial(read_foreign_mat, texts=texts)
     if start.startswith((b"PK\x03\x04", b"\x1f\x8b")):
         raise OutputError(
             f"{path} is an archive (FMU, spreadsheet, zip or gzip), not a table. Unpack it, or export it as CSV."

@@ -39,6 +39,11 @@ class SignalInfo:
     declared_unit: str | None = None
     display_scale: tuple[float, float] | None = None
 
+    def __post_init__(self) -> None:
+        """JSON knows lists alone."""
+        if self.display_scale is not None:
+            object.__setattr__(self, "display_scale", tuple(self.display_scale))
+
     @property
     def shown(self) -> ShownUnit:
         """The unit in which pages, tables and pictures show it: the display unit, else the declared one, else SI."""

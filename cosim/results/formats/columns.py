@@ -58,6 +58,17 @@ def result_of_columns(
     )
 
 
+def numbered(texts: Sequence[str | None]) -> tuple[np.ndarray, tuple[str, ...]]:
+    """A column of texts as numbers, 1 for the first that stands in it, shape (rows,), NaN where there is none; and the
+    texts.
+
+    Args:
+        texts: of the rows.
+    """
+    items = {text: number for number, text in enumerate(dict.fromkeys(t for t in texts if t is not None), start=1)}
+    return np.array([np.nan if text is None else items[text] for text in texts], np.float64), tuple(items)
+
+
 def check_time(source: str, time: np.ndarray) -> None:
     """Time must not go backwards; equal times, before and after an event, are allowed.
 

@@ -17,7 +17,7 @@ import scipy
 
 from cosim.errors import OutputError
 from cosim.results.formats.about import about_text, blocks, signals_of, with_about
-from cosim.results.formats.columns import result_of_columns
+from cosim.results.formats.columns import numbered, result_of_columns
 from cosim.results.formats.format import Format
 from cosim.results.formats.mat_file import MatFormat
 from cosim.results.result_data import ResultData, SignalInfo
@@ -117,12 +117,13 @@ def _header(file: BinaryIO, name: str, kind: int, rows: int, columns: int) -> No
     file.write(struct.pack("<5i", kind, rows, columns, 0, len(name) + 1) + name.encode() + b"\0")
 
 
-def read_foreign_mat(path: Path) -> ResultData:
+def read_foreign_mat(path: Path, *, texts: bool = False) -> ResultData:
     """Read a MAT file of version 4 to 7: ours, a Modelica trajectory (``binTrans`` or ``binNormal``), or vectors with
     ``time``.
 
     Args:
-        path: the file.
+        path: the file. texts: whether vectors of texts are taken, see `cosim.results.load_result.load_result`; else
+            they are left out, as whatever else a workspace holds.
 
     Raises:
         OutputError: it is none of these; the message says what it holds.
@@ -141,7 +142,7 @@ def read_foreign_mat(path: Path) -> ResultData:
     if "signals" in content and "events" in content:
         result = MatFormat.read(path)
         return replace(result, summary={"events_recorded": True, **result.summary})
-    return _vectors(str(path), content)
+    return _vectors(str(path), content, texts)
 
 
 # --- trajectories -----------------------------------------------------------------------------------------------------
@@ -249,7 +250,7 @@ def _decoded(text: str) -> str:
 # --- vectors ----------------------------------------------------------------------------------------------------------
 
 
-def _vectors(source: str, content: Mapping[str, Any]) -> ResultData:
+def _vectors(source: str, content: Mapping[str, Any], texts: bool) -> ResultData:
     """All vectors as long as ``time``: a workspace, as from Simulink's *To Workspace* blocks saved as arrays."""
     arrays = {n: v for n, v in content.items() if isinstance(v, np.ndarray) and v.dtype.kind in "biuf" and v.ndim == 2}
     vectors = {n: v.ravel() for n, v in arrays.items() if 1 in v.shape}
@@ -257,9 +258,25 @@ def _vectors(source: str, content: Mapping[str, Any]) -> ResultData:
     if time is None:
         held = ", ".join(f"{n} {np.shape(v)}" for n, v in content.items() if not n.startswith("__"))
         raise OutputError(f"{source}: there is no vector 'time'; it holds: {held or 'nothing'}.")
-    kept = {n: v for n, v in vectors.items() if len(v) == len(vectors[time])}
+    kept = {n: np.asarray(v, np.float64) for n, v in vectors.items() if len(v) == len(vectors[time])}
+    rows = {n: _text_rows(v) for n, v in content.items() if isinstance(v, np.ndarray)} if texts else {}
+    said = {n: numbered(found) for n, found in rows.items() if found and len(found) == len(vectors[time])}
+    kept |= {n: numbers for n, (numbers, _) in said.items()}
     names = ["time" if name == time else name for name in kept]
-    return result_of_columns(source, names, [np.asarray(v, np.float64) for v in kept.values()], {})
+    return result_of_columns(source, names, list(kept.values()), {}, texts={n: items for n, (_, items) in said.items()})
+
+
+def _text_rows(found: np.ndarray) -> list[str | None]:
+    """The rows of a cell array of texts, or of a matrix of letters, whose rows MATLAB fills up with spaces; nothing
+    where it is neither. An empty cell is no text.
+    """
+    if found.dtype.kind == "U" and found.ndim == 2:
+        return ["".join(row).rstrip() or None for row in found.tolist()]
+    cells = found.ravel().tolist() if found.dtype.kind == "O" and found.ndim == 2 and 1 in found.shape else []
+    letters = [np.asarray(cell) for cell in cells]
+    if not all(cell.dtype.kind == "U" or not cell.size for cell in letters):
+        return []
+    return ["".join(map(str, cell.ravel().tolist())) or None for cell in letters]
 
 
 class ModelicaFormat(Format):

@@ -26,7 +26,7 @@ from cosim.results.formats.about import (
     signals_of,
     with_about,
 )
-from cosim.results.formats.columns import result_of_columns
+from cosim.results.formats.columns import numbered, result_of_columns
 from cosim.results.formats.format import Format
 from cosim.results.optional import optional_module
 from cosim.results.result_data import ResultData, SignalInfo
@@ -81,9 +81,8 @@ def _numbered(column: Any) -> tuple[Any, tuple[str, ...]]:
     kind = column.type.value_type if types.is_dictionary(column.type) else column.type
     if not (types.is_string(kind) or types.is_large_string(kind)):
         return column, ()
-    texts = column.cast(kind).to_pylist()
-    items = {text: number for number, text in enumerate(dict.fromkeys(t for t in texts if t is not None), start=1)}
-    return _modules()[0].array([items.get(text) for text in texts], _modules()[0].int64()), tuple(items)
+    numbers, items = numbered(column.cast(kind).to_pylist())
+    return _modules()[0].array(numbers), items
 
 
 def _column(source: str, name: str, column: Any) -> np.ndarray:

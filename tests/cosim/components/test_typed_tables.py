@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.io
 from hypothesis import given
 from hypothesis import strategies as st
 from test_fmus.typed import MOODS, expected, typed_fmu
@@ -15,6 +16,7 @@ from test_fmus.typed import MOODS, expected, typed_fmu
 from cosim import Scenario
 from cosim.errors import CosimError, CouplingError, OutputError
 from cosim.results.formats.foreign_csv import read_foreign_csv
+from cosim.results.load_result import load_result
 
 COLUMNS = ("u_float64", "u_int32", "u_boolean", "u_enumeration")
 ROWS = [(0.5, 1, "false", "calm"), (0.7, 2, "true", "busy"), (0.9, 3, "true", "angry")]
@@ -31,6 +33,14 @@ def table(path: Path, rows: list[Any]) -> Path:
         lines = [",".join(map(str, (0.5 * k, *row))) for k, row in enumerate(rows)]
         path.write_text("\n".join([",".join(("time", *COLUMNS)), *lines]) + "\n")
         return path
+    if path.suffix == ".mat":
+        columns = dict(zip(COLUMNS, map(list, zip(*rows, strict=True)), strict=True))
+        columns["u_boolean"] = [flag in ("true", 1) for flag in columns["u_boolean"]]
+        modes = columns["u_enumeration"]
+        if isinstance(modes[0], str) and "cells" in path.name:  # else a matrix of letters
+            columns["u_enumeration"] = np.array(modes, object).reshape(-1, 1)
+        scipy.io.savemat(path, {"t": 0.5 * np.arange(len(rows)), "note": "of a workspace", **columns}, oned_as="column")
+        return path
     pandas = pytest.importorskip("pandas")
     pytest.importorskip("pyarrow")
     frame = pandas.DataFrame(rows, columns=COLUMNS)
@@ -46,7 +56,7 @@ def driven(fmu: Path, path: Path) -> Scenario:
 
 
 @pytest.mark.compiler
-@pytest.mark.parametrize("name", ["in.csv", "in.parquet"])
+@pytest.mark.parametrize("name", ["in.csv", "in.parquet", "in.mat", "in_cells.mat"])
 @pytest.mark.parametrize("rows", [ROWS, NUMBERS], ids=["names", "numbers"])
 @pytest.mark.parametrize("version", [1, 2, 3])
 def test_columns_drive_inputs_of_their_types(version: Any, rows: list[Any], name: str, tmp_path: Path) -> None:
@@ -90,6 +100,13 @@ def test_texts_drive_no_numbers(typed: Path, tmp_path: Path) -> None:
     scenario.add("inputs", recording=table(tmp_path / "in.csv", ROWS)).connect("inputs.u_enumeration -> fmu.u_float64")
     with pytest.raises(CouplingError, match=r"holds texts.*fmu\.u_float64 is a Real"):
         scenario.run()
+
+
+def test_texts_of_a_workspace_are_left_out_of_a_result(tmp_path: Path) -> None:
+    """A workspace holds what it holds; nobody asked for these."""
+    for name in ("in.mat", "in_cells.mat"):
+        result = load_result(table(tmp_path / name, ROWS))
+        assert set(result) == {"time", *COLUMNS} - {"u_enumeration"}
 
 
 def test_a_table_of_texts_is_no_result(tmp_path: Path) -> None:
