@@ -71,12 +71,17 @@ _LETTERS: Mapping[str, Set[str]] = {
 }
 """Single letters that do so at the begin of a name: ``v``, ``v_train``, ``body.v``."""
 
-_FOREIGN: Set[str] = _words(
+_SURROUNDINGS: Set[str] = _words(
+    "ambient amb pamb patm tamb pressure druck pression pressione presion temperature temp wind gradient grade slope"
+)
+"""Words of what acts on a train from outside, and is no effort."""
+
+_FOREIGN: Set[str] = _SURROUNDINGS | _words(
     "reference ref setpoint set target desired wanted soll sollwert ziel consigne cible riferimento limit limite lim "
-    "max min maximum minimum error err fehler erreur deviation difference diff noise wind ambient relative rel delta "
-    "tolerance limits resistance resistive resistances widerstand fahrwiderstand gradient grade slope coupler kupplung "
+    "max min maximum minimum error err fehler erreur deviation difference diff noise relative rel delta "
+    "tolerance limits resistance resistive resistances widerstand fahrwiderstand coupler kupplung "
     "buffer brake braking brems bremse bremskraft frein freinage freno brems disturbance storung friction reibung "
-    "acceleration accel beschleunigung count status flag valid id index temperature power energy current voltage "
+    "acceleration accel beschleunigung count status flag valid id index power energy current voltage "
     "previous next total remaining estimated"
 )
 """Words that speak of something else: a reference, a limit, an error, another force."""
@@ -253,6 +258,16 @@ def _denied(quantity: Quantity, signal: GuessedSignal) -> int:
     if WORDS[_key(quantity)] & name or quantity == "effort":
         return 0  # what is named plainly may be described beside other things
     return _DENIED if set(_words_of(signal.description)) & against else 0
+
+
+def acts_from_outside(signal: GuessedSignal) -> bool:
+    """Whether name or description speak of what is around a train, and nothing of an effort.
+
+    Args:
+        signal: a signal of the FMU.
+    """
+    words = {*_words_of(signal.name), *_words_of(signal.description)}
+    return not words & WORDS["effort"] and bool(words & _SURROUNDINGS)
 
 
 def in_si(signal: GuessedSignal) -> float:

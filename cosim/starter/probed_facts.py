@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import isnan, nan
 
 from cosim.components.stated_units import StatedUnit
-from cosim.starter.guessed_signal import GuessedSignal, fits
+from cosim.starter.guessed_signal import GuessedSignal, acts_from_outside, fits
 from cosim.starter.inspected_fmu import InspectedFmu
 from cosim.starter.probe_run import MORE, ProbeRun
 from cosim.starter.starter_roles import PlantRoles
@@ -85,8 +85,11 @@ def probe(inspected: InspectedFmu, roles: PlantRoles, run: ProbeRun) -> ProbedFa
 
 
 def _can_be_effort(signal: GuessedSignal) -> bool:
-    """A number in no unit, or in one of a force or of a share of it: a mass flow drives no train."""
-    return signal.type in FLOATING_TYPES and (signal.meaning is None or any(fits(signal, unit) for unit in ("N", "1")))
+    """A number in no unit, or in one of a force or of a share of it, that is not named as the surroundings: neither a
+    mass flow nor an ambient pressure drives a train.
+    """
+    has_unit = signal.meaning is None or any(fits(signal, unit) for unit in ("N", "1"))
+    return signal.type in FLOATING_TYPES and has_unit and not acts_from_outside(signal)
 
 
 @dataclass

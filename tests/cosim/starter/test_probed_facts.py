@@ -12,12 +12,26 @@ from cosim.starter.probed_facts import probe
 from plant_models.hybrid.units import UnitError, parse_unit
 
 
-def _input(unit: str | None) -> GuessedSignal:
+def _input(unit: str | None, name: str = "u", text: str = "") -> GuessedSignal:
     try:
         meaning = None if unit is None else parse_unit(unit)
     except UnitError:
         meaning = None
-    return GuessedSignal("u", unit, meaning)
+    return GuessedSignal(name, unit, meaning, text)
+
+
+def _tried(signal: GuessedSignal) -> list[str]:
+    """Inputs that a probe steps, of an FMU with this one."""
+    asked: list[str] = []
+
+    def respond(name: str, _parameters: Any) -> None:
+        asked.append(name)
+
+    inspected: Any = SimpleNamespace(inputs=[signal], outputs=[], hidden=[])
+    run: Any = SimpleNamespace(respond=respond)
+    roles: Any = SimpleNamespace(effort=None)
+    assert not probe(inspected, roles, run).facts
+    return asked
 
 
 @pytest.mark.parametrize(
@@ -25,13 +39,20 @@ def _input(unit: str | None) -> GuessedSignal:
     [(None, True), ("kN", True), ("%", True), ("notch", True), ("kg/s", False), ("degC", False), ("Pa", False)],
 )
 def test_what_is_measured_in_something_else_than_a_force_is_no_effort(unit: str | None, tried: bool) -> None:
-    asked: list[str] = []
+    assert _tried(_input(unit)) == ["u"] * tried
 
-    def respond(name: str, _parameters: Any) -> None:
-        asked.append(name)
 
-    inspected: Any = SimpleNamespace(inputs=[_input(unit)], outputs=[], hidden=[])
-    run: Any = SimpleNamespace(respond=respond)
-    roles: Any = SimpleNamespace(effort=None)
-    assert not probe(inspected, roles, run).facts
-    assert asked == ["u"] * tried
+@pytest.mark.parametrize(
+    ("name", "text", "tried"),
+    [
+        ("Pamb", "", False),
+        ("p_amb", "", False),
+        ("y3", "Ambient pressure", False),
+        ("windSpeed", "", False),
+        ("F_soll", "", True),
+        ("u1", "Traction demand, less the slope", True),
+        ("pedal", "", True),
+    ],
+)
+def test_what_is_around_a_train_is_no_effort(name: str, text: str, tried: bool) -> None:
+    assert _tried(_input(None, name, text)) == [name] * tried
