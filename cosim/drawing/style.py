@@ -36,9 +36,9 @@ OBSERVER_LINES: tuple[dict[str, Any], ...] = (
     {"color": _ORANGE, "linestyle": (0, (9, 3)), "linewidth": 1.5},
     {"color": _SKY, "linestyle": (0, (4, 1.2, 1.2, 1.2, 1.2, 1.2)), "linewidth": 1.5},
 )
-# a band, on which the estimates lie
-TRUE_LINE: dict[str, Any] = {"color": BAND, "linestyle": "-", "linewidth": 5.0}
-ODOMETER_LINE: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 0.8}
+# a band, on which all others lie; above it what is measured, then the estimates, noisy ones too
+TRUE_LINE: dict[str, Any] = {"color": BAND, "linestyle": "-", "linewidth": 5.0, "zorder": 1.3}
+ODOMETER_LINE: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 0.8, "zorder": 1.4}
 REFERENCE_LINE: dict[str, Any] = {"color": BLACK, "linestyle": (0, (1, 3)), "linewidth": 1.2}
 TRUE_LINE_ABOVE: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.3, "zorder": 2.5}  # over noise
 NOISY_LINE: dict[str, Any] = {"linestyle": "-", "linewidth": 0.5, "alpha": 0.55, "zorder": 1.6}

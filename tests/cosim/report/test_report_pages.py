@@ -133,6 +133,16 @@ def test_other_trains_of_a_run_are_drawn_beside_the_true_one(result: Result) -> 
     assert spec_of(replace(result, summary={"report": {**vars(spec), "phases": []}})).other_trains == ["discrete_uio"]
 
 
+def test_estimates_lie_above_what_is_measured_noisy_ones_too(result: Result) -> None:
+    table = result.table.copy()
+    table["discrete_uio.speed"] += 0.2 * (-1.0) ** np.arange(len(table))
+    ax = SpeedPanel.draw(replace(result, table=table), synthetic_spec(), None)
+    height = {str(line.get_label()): line.get_zorder() for line in ax.get_lines()}
+    estimates = {synthetic_spec().labels.get(name, name) for name in synthetic_spec().observers}
+    assert estimates <= set(height)
+    assert height["true"] < height["odometer"] < min(height[name] for name in estimates)
+
+
 def limits(ax: Axes) -> tuple[float, float]:
     return ax.get_ylim()
 
