@@ -30,6 +30,7 @@ class Recipe:
         record: variables recorded besides the outputs, of an FMU alone.
         overrides: of a scenario, as for `Scenario.set`.
         interpolation: whether columns of the table are held or run on lines, of all or of some by name.
+        units: what is stated of the variables of an FMU alone, by name.
     """
 
     kind: Kind = "result"
@@ -42,6 +43,7 @@ class Recipe:
     record: Sequence[str] = ()
     overrides: Mapping[str, Any] = field(default_factory=dict)
     interpolation: Chosen = None
+    units: Mapping[str, Any] = field(default_factory=dict)
 
     def to_data(self, folder: Path) -> dict[str, Any]:
         """Plain data for a file in `folder`."""
@@ -49,7 +51,7 @@ class Recipe:
         if self.source:
             data["source"] = _relative(self.source, folder)
         data |= {key: value for key in ("start", "stop", "step") if (value := getattr(self, key)) is not None}
-        for key in ("inputs", "parameters", "overrides"):
+        for key in ("inputs", "parameters", "overrides", "units"):
             value = getattr(self, key)
             if value:
                 data[key] = _relative(value, folder) if isinstance(value, str) else dict(value)

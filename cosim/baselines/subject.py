@@ -166,6 +166,7 @@ def _fmu_recipe(what: str | Path, folder: Path, times: Mapping[str, Any], chosen
         parameters=dict(chosen.get("parameters", {})),
         record=tuple(chosen.get("record", ())),
         interpolation=chosen.get("interpolation"),
+        units=dict(chosen.get("units", {})),
     )
 
 

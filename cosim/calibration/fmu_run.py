@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
+from cosim.components.stated_units import StatedUnit
 from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import SealedModel
 from cosim.process.exit_guard import limited_calls
@@ -38,12 +39,14 @@ class SealedFmu:
     Args:
         path: of the file. interface: None for co-simulation where the FMU has it. parameters: start values by name, in
             an order. call_timeout: how long a call of it may last [s]; inf for any time, None for ten minutes.
+        units: what is stated of its variables, by name.
     """
 
     path: str
     interface: Interface | None
     parameters: tuple[tuple[str, float], ...]
     call_timeout: float | None
+    units: tuple[tuple[str, StatedUnit], ...] = ()
 
     @property
     def name(self) -> str:
@@ -57,7 +60,8 @@ class SealedFmu:
             if self not in _open:
                 _close()
                 with LAST_CALL.making(self.name, "loading, instantiate or initialisation"):
-                    _open[self] = open_model(self.path, self.interface, states=(), parameters=dict(self.parameters))
+                    known: dict[str, Any] = {"parameters": dict(self.parameters), "units": dict(self.units)}
+                    _open[self] = open_model(self.path, self.interface, states=(), **known)
             try:
                 yield _open[self]
             except BaseException:  # perhaps it can do nothing any more
@@ -107,7 +111,9 @@ class _FmuJob(Job):
     @property
     def key(self) -> str:
         """Digest of the contents of the FMU, of how it is opened, and of the versions, with the settings."""
-        opened = repr((self.fmu.name, self.fmu.interface, self.fmu.parameters, sorted(self.settings.items())))
+        opened = repr(
+            (self.fmu.name, self.fmu.interface, self.fmu.parameters, self.fmu.units, sorted(self.settings.items()))
+        )
         return digest(file_digest(Path(self.fmu.path)), opened, version_text())
 
     def files(self) -> Sequence[ForeignFile]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cosim.calibration.fmu_run import FmuRun, ReadSignals, SealedFmu
 from cosim.calibration.job_runs import JobRuns
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
+from cosim.components.stated_units import stated_units
 from cosim.runs.executors import make_executor
 from cosim.runs.journal import Journal
 from fmus.fmi.standard import Interface
@@ -32,6 +34,7 @@ class FmuRuns(JobRuns):
         call_timeout: how long a call of the FMU may last [s]; inf for any time, None for ten minutes.
         workers, scheduler: where it is run, see `make_executor`.
         journal: that runs are written to and taken over from; None for none.
+        units: what is known of the variables of the FMU and not declared, as in a scenario file.
 
     Raises:
         CosimError: a parameter does not exist or cannot be set, or the FMU cannot be opened.
@@ -51,13 +54,15 @@ class FmuRuns(JobRuns):
         workers: int = 1,
         scheduler: str | None = None,
         journal: Journal | None = None,
+        units: Mapping[str, Any] | None = None,
     ) -> None:
         if call_timeout is not None and not call_timeout > 0.0:
             raise CalibrationError(f"call_timeout {call_timeout!r}: expected seconds above 0.")
         super().__init__(str(path), make_executor(workers, scheduler, apart=True), journal)
         self._step = step
         everything = dict.fromkeys(names, 0.0) | dict(guesses or {}) | dict(fixed or {})
-        self._fmu = SealedFmu(str(path), interface, tuple(everything.items()), call_timeout)
+        stated = tuple(stated_units(units or {}).items())
+        self._fmu = SealedFmu(str(path), interface, tuple(everything.items()), call_timeout, stated)
         try:
             self._signals = self.row_of(ReadSignals(self._fmu, dict.fromkeys(names, 0.0)))
         except BaseException:

@@ -18,7 +18,7 @@ from cosim.errors import ScenarioError
 from cosim.run.backends import Notify
 from cosim.runs.executors import Executor, make_executor
 from cosim.simulation.scenario import Scenario
-from cosim.starter.starter_file import starter
+from cosim.starter.starter_file import StarterWishes, starter
 
 SEEDS, FURTHER = 4, 24
 """Disturbed runs of all, so that each error has both signs, and those that the best get besides."""
@@ -139,17 +139,17 @@ class _Search:
         return every if kept is None else [replace(r, also=kept[r.score.name]) for r in every if r.score.name in kept]
 
 
-def scenario_for_fmu(path: str | Path) -> Scenario:
+def scenario_for_fmu(path: str | Path, assumed: Sequence[str] = ()) -> Scenario:
     """The scenario that `cosim new` writes for a plant FMU; no file is written.
 
     Args:
-        path: of the FMU.
+        path: of the FMU. assumed: what is known of its variables, as for `StarterWishes`.
 
     Raises:
         CosimError: the FMU cannot be read, or nothing in it looks like a train.
     """
     file = Path(path).resolve()
-    made = starter(file, file.with_suffix(".toml"))
+    made = starter(file, file.with_suffix(".toml"), StarterWishes(assumed=assumed))
     if made.kind == "observer":
         raise ScenarioError(
             f"{path} is an observer and no train. To see it beside the others: cosim new {file.name}, your train into "

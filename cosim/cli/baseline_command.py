@@ -19,6 +19,7 @@ from cosim.baselines.subject import Subject, make_subject, run_again
 from cosim.baselines.update import plan_update
 from cosim.cli.arguments import FIGURE_FILES, OVERRIDES, QUIET, number_from_zero, positive_number, settings_argument
 from cosim.cli.scenarios import between_samples, parse_setting, simulated_time_bar
+from cosim.cli.stated_units import UNIT, stated_of
 from cosim.cli.tolerances import TOLERANCES, Asked, asked_tolerances, chosen_tolerances
 from cosim.comparison.compare import curve_of
 from cosim.comparison.comparison_text import comparison_parts, comparison_verdict, difference_parts
@@ -47,6 +48,7 @@ _MAKE = (
     argument("subject", metavar="FMU_OR_SCENARIO", help="an FMU, a scenario by name or file, or a results folder"),
     FILE,
     settings_argument(f"of a scenario: {OVERRIDES}; of an FMU: a start value or a constant input"),
+    UNIT,
     argument("--inputs", metavar="TABLE", help="of an FMU: a table with a column for each input"),
     argument(
         "--between",
@@ -133,6 +135,7 @@ def _subject(options: argparse.Namespace) -> Subject:
 def _values(options: argparse.Namespace) -> dict[str, Any]:
     """What ``--set`` and ``--inputs`` mean: overrides of a scenario; constant inputs and start values of an FMU."""
     values = dict(parse_setting(setting) for setting in options.settings)
+    stated = stated_of(options.subject, options.unit)
     if Path(options.subject).suffix.lower() != ".fmu":
         return {"overrides": values, "inputs": options.inputs}
     variables = read_description(options.subject, options.subject).modelVariables
@@ -141,7 +144,8 @@ def _values(options: argparse.Namespace) -> dict[str, Any]:
         raise BaselineError(
             f"Give the inputs in the table {options.inputs} or with --set, not both: {', '.join(held)}."
         )
-    return {"inputs": options.inputs or held, "parameters": values}
+    units = {name: fact.model_dump(exclude_defaults=True) for name, fact in stated.items()}
+    return {"inputs": options.inputs or held, "parameters": values, "units": units}
 
 
 def _check(options: argparse.Namespace) -> Output:

@@ -19,6 +19,7 @@ from cosim.calibration.runs import Runs
 from cosim.cli.arguments import MANY_RUNS, PARAMETERS_FILE, TRUST_RESULTS, positive_number, settings_argument
 from cosim.cli.output import save_figure, write_text
 from cosim.cli.scenarios import between_samples, parse_setting, setting_number
+from cosim.cli.stated_units import UNIT, stated_of
 from cosim.errors import CosimError, ScenarioError, nearest
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
@@ -92,6 +93,7 @@ ARGUMENTS = (
     ),
     settings_argument("not fitted"),
     TRUST_RESULTS,
+    UNIT,
     argument("--from", type=float, default=-inf, dest="begin", metavar="SECONDS", help="begin of the part to use"),
     argument("--to", type=float, default=inf, dest="end", metavar="SECONDS", help="end of the part to use"),
     argument(
@@ -151,7 +153,8 @@ def execute(options: argparse.Namespace) -> Output:
 
 def _calibrated(options: argparse.Namespace) -> tuple[Calibration, list[str]]:
     """The calibration, and the inputs that were not recorded."""
-    recording = _recording(options)
+    is_known = str(options.model).lower().endswith(".fmu")  # else what is stated is of an FMU that is driven
+    recording = _recording(options, () if is_known else options.unit)
     inputs = dict(map(parse_setting, options.inputs))
     runs = _runs(options, inputs)
     try:
@@ -170,8 +173,9 @@ def _calibrated(options: argparse.Namespace) -> tuple[Calibration, list[str]]:
         runs.close()
 
 
-def _recording(options: argparse.Namespace) -> Result:
-    """The recording, of an FMU the run under constant inputs, with these among its columns."""
+def _recording(options: argparse.Namespace, units: Sequence[str]) -> Result:
+    """The recording, of an FMU the run under constant inputs, with these among its columns, and units as stated."""
+    stated = stated_of(options.recording, units)
     driven = _numbers("--drive", options.drive)
     if not str(options.recording).lower().endswith(".fmu"):
         if driven:
@@ -181,8 +185,9 @@ def _recording(options: argparse.Namespace) -> Result:
         raise ScenarioError(
             f"{options.recording}: an FMU is driven; say by which input and how hard: --drive effort=60e3 [N]."
         )
+    step, record = options.step or _RUN_STEP, list(driven)
     scenario = cosim.Scenario.fmu(
-        options.recording, stop=options.stop, step=options.step or _RUN_STEP, parameters=driven, record=list(driven)
+        options.recording, stop=options.stop, step=step, parameters=driven, record=record, units=stated
     )
     outcome = scenario.run(warn=lambda _text: None)
     if outcome.failure is not None:
@@ -230,6 +235,7 @@ def _fmu_runs(
         names,
         fixed=_numbers("--set", options.settings),
         guesses=guesses,
+        units=stated_of(path, options.unit),
         interface=options.interface,
         step=options.step,
         call_timeout=CALL_TIMEOUT if options.call_timeout is None else options.call_timeout,

@@ -17,6 +17,7 @@ from cosim.choice.trial import Trial
 from cosim.cli.arguments import FIGURE_FILES, QUIET, TRUST_RESULTS, positive, settings_argument
 from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import load_scenario
+from cosim.cli.stated_units import ASSUME
 from cosim.errors import OutputError, RunError, ScenarioError
 from cosim.results.results_folder import check_writable
 from cosim.simulation.scenario import Scenario
@@ -61,6 +62,7 @@ ARGUMENTS = (
     argument("scenario", metavar="SCENARIO|FMU", help="a shipped scenario, a file (.toml or .ssp), or a plant (.fmu)"),
     settings_argument(),
     TRUST_RESULTS,
+    ASSUME,
     argument(
         "--observers",
         type=_names,
@@ -104,6 +106,8 @@ ARGUMENTS = (
 
 def execute(options: argparse.Namespace) -> Output:
     """Choose, and write where the options ask for it."""
+    if options.seeds == 0:
+        raise ScenarioError("--seeds 0: the nominal run alone says nothing of what may go wrong; 1 at least.")
     demand_casadi()  # hundreds of runs in plain NumPy would take hours
     if options.write is not None and options.write.exists() and not options.force:
         raise OutputError(f"{options.write} exists already; choose another name, or replace it with --force.")
@@ -204,7 +208,12 @@ def _scenario(options: argparse.Namespace) -> Scenario:
     """
     file = Path(options.scenario)
     if file.suffix.lower() == ".fmu":
-        return load_scenario(options, scenario_for_fmu(options.scenario))
+        return load_scenario(options, scenario_for_fmu(options.scenario, options.assume))
+    if options.assume:
+        raise ScenarioError(
+            f"--assume belongs to an FMU; what is known of those in {file} stands in their tables "
+            "[components.NAME.units]."
+        )
     if file.is_file() and file.suffix.lower() not in _SCENARIOS:
         raise ScenarioError(f"{file} is no scenario (.toml or .ssp) and no train (.fmu).")
     return load_scenario(options)

@@ -6,8 +6,9 @@ import argparse
 import shlex
 from pathlib import Path
 
+from cosim.cli.stated_units import ASSUME
 from cosim.starter.starter_file import StarterWishes, write_starter
-from fmus.cli.commands import argument, repeated
+from fmus.cli.commands import argument
 from fmus.cli.output import Output
 
 GROUP = "Models and files"
@@ -35,12 +36,7 @@ ARGUMENTS = (
         metavar="NAME",
         help="observer to put beside it, a name or file.py:Class (default: quasi_lpv_uio, or odometer_reset)",
     ),
-    repeated(
-        "--assume",
-        "NAME=UNIT",
-        "what you know of a variable: its unit, -UNIT where it counts the other way, its role (position, speed, "
-        "wheel_speed, effort, mass, ...), or ROLE,UNIT; may be repeated",
-    ),
+    ASSUME,
     argument("--no-probe", dest="probe", action="store_false", help="run nothing of the FMU"),
     argument("--force", action="store_true", help="replace a file that exists"),
 )

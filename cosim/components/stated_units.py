@@ -6,11 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fmpy.model_description import BaseUnit, ModelDescription, ModelVariable
 from fmpy.model_description import Unit as DeclaredUnit
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
 from cosim.errors import CouplingError, nearest
 from cosim.toml_table import TomlTable
@@ -33,6 +33,22 @@ class StatedUnit(TomlTable):
 
 Stated = Annotated[StatedUnit, BeforeValidator(lambda stated: {"unit": stated} if isinstance(stated, str) else stated)]
 """A unit, or a table of what else is known."""
+
+
+def stated_units(units: Mapping[str, Any]) -> dict[str, StatedUnit]:
+    """What is stated in plain data, as of a scenario file or of the recipe of a baseline.
+
+    Args:
+        units: by name of the variable a unit, or a table of what else is known.
+
+    Raises:
+        CouplingError: it is none of these.
+    """
+    try:
+        return TypeAdapter(dict[str, Stated]).validate_python(dict(units))
+    except ValidationError as error:
+        raise CouplingError(f"units: {error.errors()[0]['loc'][0]}: {error.errors()[0]['msg']}.") from error
+
 
 NONE_STATED: Mapping[str, StatedUnit] = MappingProxyType({})
 

@@ -83,6 +83,7 @@ class FmuRegression:
         record: Sequence[str] = (),
         overrides: Mapping[str, Any] | None = None,
         interpolation: str | Mapping[str, str] | None = None,
+        units: Mapping[str, Any] | None = None,
         signals: Sequence[str] | None = None,
         every: float | None = None,
         tolerance: Any = None,
@@ -99,6 +100,7 @@ class FmuRegression:
             inputs: of an FMU alone: constants by name, or a table (CSV) with a column for each.
             parameters: start values of an FMU alone. record: its variables to record besides the outputs.
             interpolation: of the columns of a table of inputs: ``hold`` or ``linear``, for all or for some by name.
+            units: what is known of the variables of an FMU alone and not declared: ``{"vIst": "km/h"}``.
             overrides: of a scenario: ``{"locomotive.mass": 70e3}``.
             signals: names or patterns of the signals to keep and compare; None for all.
             every: least spacing of the rows kept [s]; None for at most about 2000 rows.
@@ -116,6 +118,7 @@ class FmuRegression:
         compared |= {"tolerance": tolerance, "tolerances": tolerances}
         run: dict[str, Any] = {"start": start, "stop": stop, "step": step, "overrides": overrides}
         run |= {"inputs": inputs, "parameters": parameters, "record": record, "interpolation": interpolation}
+        run |= {"units": units}
         try:
             call = Call.run(what, self._file.parent, path, **compared, **run)
             return self._update(call) if options.mode(self._config) == "update" else self._check(call)

@@ -30,7 +30,8 @@ class FmuAlone:
         start, stop: of the run [s]; None for those of the FMU's default experiment. step: communication step [s]; None
             for the FMU's own, or a thousandth of the run. inputs: constants by name, or the path of a table.
         parameters: start values by name. record: signals to record besides the outputs.
-        interpolation: of the columns of the table, as for a recording.
+        interpolation: of the columns of the table, as for a recording. units: what is known of its variables and not
+            declared, as in a scenario file.
     """
 
     start: float | None = None
@@ -40,6 +41,7 @@ class FmuAlone:
     parameters: Mapping[str, Any] | None = None
     record: Sequence[str] = ()
     interpolation: Chosen = None
+    units: Mapping[str, Any] | None = None
 
 
 def tables_of_fmu(path: Path, name: str, run: FmuAlone) -> tuple[dict[str, Any], list[str]]:
@@ -71,6 +73,8 @@ def tables_of_fmu(path: Path, name: str, run: FmuAlone) -> tuple[dict[str, Any],
         table["parameters"] = values
     if run.record:
         table["record"] = list(run.record)
+    if run.units:
+        table["units"] = dict(run.units)
     return tables, warnings
 
 

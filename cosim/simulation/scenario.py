@@ -110,6 +110,7 @@ class Scenario(StatedScenario, FirstScreen):
         name: str = "fmu",
         interpolation: Interpolation | Mapping[str, Interpolation] | None = None,
         isolate: Isolate | None = None,
+        units: Mapping[str, Any] | None = None,
     ) -> Scenario:
         """A scenario of one FMU alone: for a look at it, or for a regression test of its outputs.
 
@@ -126,12 +127,14 @@ class Scenario(StatedScenario, FirstScreen):
             interpolation: ``hold`` or ``linear`` for all columns of the table, or for some by name: a command that was
                 logged is held.
             isolate: ``component`` for a process of its own.
+            units: what its owner knows and its description does not say, by name of the variable: ``"km/h"``, or
+                ``{"unit": "kN", "sign": -1}``, as in the table ``units`` of a scenario file.
 
         Raises:
             FmuLoadError: the FMU cannot be read.
             ScenarioError: no end is known, or an input does not exist; the nearest are suggested.
         """
-        run = FmuAlone(start, stop, step, inputs, parameters, record, interpolation)
+        run = FmuAlone(start, stop, step, inputs, parameters, record, interpolation, units)
         tables, warnings = tables_of_fmu(Path(path), name, run)
         scenario = cls(where=Path(path).name, **tables)
         if isolate is not None:

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cosim.components.stated_lines import stated_lines
 from cosim.errors import CosimError
 from cosim.runs.executors import make_executor
-from cosim.starter.assumed import assumed_facts
+from cosim.starter.guessed_signal import UNITS
 from cosim.starter.inspected_fmu import InspectedFmu, inspect_fmu
 from cosim.starter.probe_run import ProbeRun
 from cosim.starter.probed_facts import Fact, ProbedFacts, is_silent, probe
@@ -37,13 +38,16 @@ def find_facts(path: Path, assumed: Sequence[str], *, probing: bool) -> KnownFac
     """Inspect an FMU; one that declares too little is run for some seconds, in a process of its own.
 
     Args:
-        path: of the FMU. assumed: lines as of `cosim.starter.assumed.assumed_facts`. probing: whether it may be run.
+        path: of the FMU. assumed: lines as of `cosim.components.stated_lines`. probing: whether it may be run.
 
     Raises:
         FmuLoadError: the FMU cannot be read, or offers no co-simulation.
         ScenarioError, CouplingError: what is assumed cannot be.
     """
-    facts = assumed_facts(assumed, inspect_fmu(path))
+    silent = inspect_fmu(path).component
+    declared = {name: silent.unit_name(name) for name in silent.variables}
+    stated = stated_lines("--assume", assumed, declared, UNITS)
+    facts = {name: Fact(one, "as assumed") for name, one in stated.items()}
     inspected = inspect_fmu(path, {name: fact.stated for name, fact in facts.items()})
     if (
         not probing

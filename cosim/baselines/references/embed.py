@@ -34,6 +34,7 @@ from cosim.baselines.references.manifest import (
 )
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
+from cosim.components.stated_units import stated_units
 from cosim.errors import BaselineError, OutputError
 from cosim.ssp.elements_of_data import add_parameter, child, root_of, text_of
 from fmus.tables.plain_data import jsonable
@@ -72,7 +73,7 @@ def _demand_own(baseline: Baseline, fmu: Path) -> Component:
     if baseline.header.recipe.kind != "fmu" or len(baseline.header.components) == 0:
         raise BaselineError(f"{baseline.path.name} is not a baseline of an FMU alone, so it cannot be put into one.")
     identity = next(entry for entry in baseline.header.components if entry.kind == "FMU")
-    component = describe_fmu(fmu, identity.name)
+    component = describe_fmu(fmu, identity.name, stated_units(baseline.header.recipe.units))
     if component.description.modelName != identity.model:
         raise BaselineError(
             f"{baseline.path.name} is a baseline of the model '{identity.model}' (GUID {identity.guid}); {fmu.name} is "

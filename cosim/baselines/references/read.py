@@ -32,6 +32,7 @@ from cosim.comparison.tolerance import Tolerances
 from cosim.components.component import Component
 from cosim.components.description import read_description
 from cosim.components.loading import describe_fmu
+from cosim.components.stated_units import stated_units
 from cosim.errors import BaselineError, CosimError, nearest
 from cosim.results.load_result import load_result
 from cosim.results.result import Result
@@ -130,7 +131,6 @@ def read_reference(fmu: str | Path, name: str | None = None) -> Baseline:
 
 def _baseline(reference: Reference) -> Baseline:
     experiment, path = reference.experiment, reference.fmu
-    component = describe_fmu(path, COMPONENT)
     with zipfile.ZipFile(path) as archive:
         members = archive.namelist()
         texts = {}
@@ -142,6 +142,7 @@ def _baseline(reference: Reference) -> Baseline:
             texts[member] = archive.read(member)
         own = f"{FOLDER}/{experiment.name}.json"
         written = archive.read(own) if own in members else b""
+    component = describe_fmu(path, COMPONENT, stated_units(_units(written)))
     table = as_of_a_run(_load(texts[experiment.references], f"{path}, {experiment.references}"), component)
     header = _header(reference, component, table, texts)
     if written:
@@ -216,6 +217,14 @@ def _value(text: str, family: str) -> float | int | bool | str:
     return text in ("true", "1") if family == "Boolean" else text
 
 
+def _units(text: bytes) -> dict[str, Any]:
+    """What was stated of the variables when the reference was made; `_with_own` says what is wrong with the text."""
+    try:
+        return dict(json.loads(text)["run"].get("units", {}))
+    except (ValueError, LookupError, TypeError, AttributeError):
+        return {}
+
+
 def _with_own(header: Header, text: bytes, path: Path) -> Header:
     """With what this package wrote beside the reference: tolerances, versions, constant inputs."""
     try:
@@ -223,9 +232,8 @@ def _with_own(header: Header, text: bytes, path: Path) -> Header:
     except (BaselineError, ValueError) as error:
         raise BaselineError(f"{path}: the header of the reference {header.title!r}: {error}") from error
     signals = {info.name: info for info in own.signals}
-    recipe = replace(
-        header.recipe, inputs=own.recipe.inputs, parameters=own.recipe.parameters, record=own.recipe.record
-    )
+    names = ("inputs", "parameters", "record", "units")
+    recipe = replace(header.recipe, **{name: getattr(own.recipe, name) for name in names})
     return replace(
         header,
         recipe=recipe,

@@ -19,6 +19,7 @@ from cosim.calibration.fmu_runs import FmuRuns
 from cosim.calibration.recorded_signals import CalibrationError, RecordedSignals
 from cosim.calibration.scenario_runs import ScenarioRuns
 from cosim.cli import main
+from cosim.errors import CosimError
 from plant_models import PLANTS
 
 KNOWN = {"traction_coefficient": 1.0, "davis_a": 1800.0, "davis_b": 80.0, "train_speed": 3.0, "internal_step": 0.1}
@@ -165,3 +166,51 @@ def test_an_input_of_a_driven_fmu_is_converted_too(train: Path, tmp_path: Path) 
 def test_a_unit_nobody_explains_goes_to_its_own_name_only(recorded: RecordedSignals, train: Path) -> None:
     with pytest.raises(CalibrationError, match="nothing defines the unit 'furlong'"):
         found(train, RecordedSignals(TIME, recorded.measured, recorded.inputs, {"speed": "furlong"}))
+
+
+def test_units_that_are_stated_are_declared_ones(train: Path, recorded: RecordedSignals, tmp_path: Path) -> None:
+    sealed = declared(train, tmp_path / "sealed.fmu", None, None)
+    journey = in_si(recorded, 1.0 / 3.6, 1e3)
+    declares = found(declared(train, tmp_path / "declares.fmu", 1.0 / 3.6, 1e3), journey)
+    stated = {"speed": "km/h", "effort": {"unit": "kN"}}
+    with closing(FmuRuns(sealed, list(GUESS), fixed=KNOWN, guesses=GUESS, units=stated)) as runs:
+        assert runs.unit("speed") == "km/h"
+        states = calibrate(runs, journey)
+    assert states.values == pytest.approx(declares.values, rel=1e-12)  # the factors are the same but for rounding
+    with pytest.raises(CosimError, match="units: speed: Input should be"):
+        FmuRuns(sealed, list(GUESS), units={"speed": 3.6})
+    with pytest.raises(CosimError, match="sped"):
+        FmuRuns(sealed, list(GUESS), fixed=KNOWN, units={"sped": "km/h"})
+
+
+def test_the_command_takes_units_of_the_fmu_that_is_fitted_or_of_the_one_that_is_driven(
+    train: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sealed = declared(train, tmp_path / "sealed.fmu", None, None)
+    known = [f"{name}={value}" for name, value in (KNOWN | {"davis_c": 7.0, "mass": 80e3}).items()]
+    drive = ["--drive", *known, "effort=60e3", "--stop", "30"]
+    files = ["--toml", str(tmp_path / "found.toml")]
+    fixed = [word for name, value in (KNOWN | {"davis_c": 7.0}).items() for word in ("--set", f"{name}={value}")]
+    fitted = ["--parameters", "mass=70e3", "--signals", "speed", *fixed, *files]
+    assert (
+        main(["calibrate", str(sealed), str(train), *drive, *fitted, "--unit", "speed=m/s", "--unit", "effort=N"]) == 0
+    )
+    assert tomllib.loads((tmp_path / "found.toml").read_text())["parameters"]["mass"] == pytest.approx(80e3, rel=SAME)
+    assert "unit is missing" not in capsys.readouterr().out
+    resistance = [
+        "calibrate",
+        "running_resistance",
+        str(sealed),
+        *drive,
+        "--set",
+        "mass=80e3",
+        "--signals",
+        "speed=speed",
+    ]
+    assert main([*resistance, "--unit", "speed=m/s", "--unit", "effort=N"]) in (
+        0,
+        1,
+    )  # whatever is identified of a journey so short
+    assert "unit is missing" not in capsys.readouterr().out
+    assert main(["calibrate", "running_resistance", str(tmp_path / "log.csv"), "--unit", "speed=m/s"]) == 2
+    assert "--unit belongs to an FMU" in capsys.readouterr().err

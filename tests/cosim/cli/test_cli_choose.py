@@ -43,6 +43,15 @@ def test_the_answer_comes_first_and_what_is_written_runs(
     assert [entry["name"] for entry in data["runs"]][:3] == ["nominal", "seed 1", "harder seed 1"]
 
 
+def test_a_choice_needs_a_disturbed_run_and_assumes_nothing_of_a_scenario(
+    scenario: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["choose", scenario, "--observers", "odometer_reset", "--seeds", "0"]) == 2
+    assert "--seeds 0" in capsys.readouterr().err
+    assert main(["choose", scenario, "--assume", "vIst=km/h"]) == 2
+    assert "--assume belongs to an FMU" in capsys.readouterr().err
+
+
 def test_a_file_that_exists_is_kept(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
     before = Path(scenario).read_bytes()
     assert main(["choose", scenario, *FEW, "--write", scenario]) == 2

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_fmus.sealed_trains import CRYPTIC, GERMAN, TURNED, sealed
 
 import fmus
 from cosim import Scenario
@@ -18,68 +19,10 @@ from cosim.runs.executors import InThisProcess
 from cosim.runs.job import Ended, Failure, Job
 from cosim.starter import known_facts
 from cosim.starter.starter_file import StarterWishes, write_starter
-from plant_models.hybrid import HybridSystem, input_signal, output_signal, parameter, state
 
 pytestmark = pytest.mark.compiler
 
 
-class _Sealed(HybridSystem):
-    """``(1.08 m) dv = F - R(v)``; what goes in and out is named and scaled by `NAMES` and `SCALES`."""
-
-    description = "sealed"
-    source = "an example"
-    states = (state("zz1", "1"), state("zz2", "1"))
-    NAMES: Mapping[str, str]
-    SCALES: Mapping[str, float]
-
-    def _motion(self, x: Any, u: Any, p: Any) -> tuple[Any, Any]:
-        mass = getattr(p, self.NAMES["mass"]) * self.SCALES["mass"]
-        v = x.zz2
-        resistance = mass * (0.01 * np.tanh(v / 0.01) + 3.6e-4 * v + 1.8e-5 * v * abs(v))
-        return v, (getattr(u, self.NAMES["effort"]) * self.SCALES["effort"] - resistance) / (1.08 * mass)
-
-    def flow(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        v, acceleration = self._motion(x, u, p)
-        return {"zz1": v, "zz2": acceleration}
-
-    def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
-        v, acceleration = self._motion(x, u, p)
-        known = {"position": x.zz1, "speed": v, "wheel": v, "acceleration": acceleration}
-        return {name: self.SCALES[what] * known[what] for what, name in self.NAMES.items() if what in known}
-
-
-def sealed(title: str, names: Mapping[str, str], scales: Mapping[str, float], mass: float) -> HybridSystem:
-    outputs = [name for what, name in names.items() if what not in ("effort", "mass")]
-    declared = {
-        "name": title,
-        "NAMES": names,
-        "SCALES": scales,
-        "inputs": (input_signal(names["effort"], "1", 0.0),),
-        "outputs": tuple(output_signal(name, "1", "") for name in outputs),
-        "parameters": (parameter(names["mass"], "1", mass),),
-    }
-    made: HybridSystem = type(title, (_Sealed,), declared)()
-    return made
-
-
-GERMAN = sealed(
-    "zug",
-    {"effort": "Fsoll", "position": "sIst", "speed": "vIst", "wheel": "vRad", "acceleration": "aIst", "mass": "m_ges"},
-    {"effort": 1e3, "position": 1.0, "speed": 3.6, "wheel": 3.6, "acceleration": 1.0, "mass": 1e3},
-    84.0,
-)
-CRYPTIC = sealed(
-    "box",
-    {"effort": "u1", "acceleration": "y4", "wheel": "y2", "position": "y3", "speed": "y1", "mass": "p1"},
-    {"effort": -1e3, "position": 1.0, "speed": 3.6, "wheel": 1.0 / 0.46, "acceleration": 1.0, "mass": 1e3},
-    120.0,
-)
-TURNED = sealed(
-    "channels",
-    {"effort": "AO_001", "position": "AI_018", "speed": "AI_017", "acceleration": "AI_019", "mass": "K1"},
-    {"effort": 1.0, "position": -1e-3, "speed": -1.0, "acceleration": -1.0, "mass": 1.0},
-    80e3,
-)
 SHOWN = {
     "zug": {"Fsoll": (1, "kN"), "sIst": (1, "m"), "vIst": (1, "km/h"), "vRad": (1, "km/h"), "m_ges": (1, "t")},
     "box": {"u1": (-1, "kN"), "y3": (1, "m"), "y1": (1, "km/h"), "y2": (1, "rad/s"), "p1": (1, "t")},
