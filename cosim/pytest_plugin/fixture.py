@@ -116,9 +116,8 @@ class FmuRegression:
         path, reason = self._path(name), ""
         compared: dict[str, Any] = {"signals": signals, "every": every, "ignore": ignore}
         compared |= {"tolerance": tolerance, "tolerances": tolerances}
-        run: dict[str, Any] = {"start": start, "stop": stop, "step": step, "overrides": overrides}
+        run: dict[str, Any] = {"start": start, "stop": stop, "step": step, "overrides": overrides, "units": units}
         run |= {"inputs": inputs, "parameters": parameters, "record": record, "interpolation": interpolation}
-        run |= {"units": units}
         try:
             call = Call.run(what, self._file.parent, path, **compared, **run)
             return self._update(call) if options.mode(self._config) == "update" else self._check(call)

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.diagnostics.messages import Message
 from cosim.errors import nearest
-from cosim.results.shown_unit import ShownUnit, shown_unit
+from cosim.results.shown_unit import ShownUnit
 from fmus.tables.table import SCREEN_ROWS, Column, FirstScreen, Parts, Table, name_column, text_column
 
 
@@ -47,7 +47,7 @@ class SignalInfo:
     @property
     def shown(self) -> ShownUnit:
         """The unit in which pages, tables and pictures show it: the display unit, else the declared one, else SI."""
-        return shown_unit(self.unit, (self.display_unit, self.declared_unit), self.display_scale)
+        return ShownUnit.first_of(self.unit, (self.display_unit, self.declared_unit), self.display_scale)
 
 
 @dataclass(frozen=True, slots=True)

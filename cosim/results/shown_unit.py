@@ -27,6 +27,21 @@ class ShownUnit:
     offset: float = 0.0
     kept: str = "1"
 
+    @classmethod
+    def first_of(cls, kept: str, names: Iterable[str | None], scale: tuple[float, float] | None = None) -> ShownUnit:
+        """The first unit of some that numbers can be shown in.
+
+        Args:
+            kept: the unit in which they are kept. names: of the units that are wanted, the first before all others.
+            scale: factor and offset of the first one, where its name does not say them.
+        """
+        for name in names:
+            found = scale or (None if name is None else _scale(name, kept))
+            if name is not None and found is not None and found[0] > 0.0 and all(map(isfinite, found)):
+                return cls(name, *found, kept)
+            scale = None
+        return cls(kept, kept=kept)
+
     def values(self, kept: np.ndarray) -> np.ndarray:
         """Values as they are shown, shape as given.
 
@@ -74,21 +89,6 @@ class ShownUnit:
 
     def _named(self, number: float) -> str:
         return f"{number:.4g}" if self.name in ("", "1") else f"{number:.4g} {self.name}"
-
-
-def shown_unit(kept: str, names: Iterable[str | None], scale: tuple[float, float] | None = None) -> ShownUnit:
-    """The first unit of some that numbers can be shown in.
-
-    Args:
-        kept: the unit in which they are kept. names: of the units that are wanted, the first before all others.
-        scale: factor and offset of the first one, where its name does not say them.
-    """
-    for name in names:
-        found = scale or (None if name is None else _scale(name, kept))
-        if name is not None and found is not None and found[0] > 0.0 and all(map(isfinite, found)):
-            return ShownUnit(name, found[0], found[1], kept)
-        scale = None
-    return ShownUnit(kept, kept=kept)
 
 
 def shared_unit(units: Iterable[ShownUnit]) -> ShownUnit:

@@ -141,6 +141,12 @@ class GuessedSignal:
         """Whether its unit, where it has one, can be understood."""
         return self.unit is None or self.meaning is not None
 
+    @property
+    def acts_from_outside(self) -> bool:
+        """Whether name or description speak of what is around a train, and nothing of an effort."""
+        words = {*_words_of(self.name), *_words_of(self.description)}
+        return not words & WORDS["effort"] and bool(words & _SURROUNDINGS)
+
 
 @dataclass(frozen=True)
 class Guess:
@@ -258,16 +264,6 @@ def _denied(quantity: Quantity, signal: GuessedSignal) -> int:
     if WORDS[_key(quantity)] & name or quantity == "effort":
         return 0  # what is named plainly may be described beside other things
     return _DENIED if set(_words_of(signal.description)) & against else 0
-
-
-def acts_from_outside(signal: GuessedSignal) -> bool:
-    """Whether name or description speak of what is around a train, and nothing of an effort.
-
-    Args:
-        signal: a signal of the FMU.
-    """
-    words = {*_words_of(signal.name), *_words_of(signal.description)}
-    return not words & WORDS["effort"] and bool(words & _SURROUNDINGS)
 
 
 def in_si(signal: GuessedSignal) -> float:

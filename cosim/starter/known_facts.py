@@ -44,10 +44,7 @@ def find_facts(path: Path, assumed: Sequence[str], *, probing: bool) -> KnownFac
         FmuLoadError: the FMU cannot be read, or offers no co-simulation.
         ScenarioError, CouplingError: what is assumed cannot be.
     """
-    silent = inspect_fmu(path).component
-    declared = {name: silent.unit_name(name) for name in silent.variables}
-    stated = stated_lines("--assume", assumed, declared, UNITS)
-    facts = {name: Fact(one, "as assumed") for name, one in stated.items()}
+    facts = _assumed(path, assumed)
     inspected = inspect_fmu(path, {name: fact.stated for name, fact in facts.items()})
     if (
         not probing
@@ -71,6 +68,14 @@ def find_facts(path: Path, assumed: Sequence[str], *, probing: bool) -> KnownFac
         )
     inspected = inspect_fmu(path, {name: fact.stated for name, fact in facts.items()})
     return KnownFacts(inspected, facts, found.radius, remarks, probed=True)
+
+
+def _assumed(path: Path, lines: Sequence[str]) -> dict[str, Fact]:
+    """What the user assumes, by name of the variable."""
+    silent = inspect_fmu(path).component
+    declared = {name: silent.unit_name(name) for name in silent.variables}
+    stated = stated_lines("--assume", lines, declared, UNITS)
+    return {name: Fact(one, "as assumed") for name, one in stated.items()}
 
 
 def _described(fact: Fact) -> str:

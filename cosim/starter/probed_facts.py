@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import isnan, nan
 
 from cosim.components.stated_units import StatedUnit
-from cosim.starter.guessed_signal import GuessedSignal, acts_from_outside, fits
+from cosim.starter.guessed_signal import GuessedSignal, fits
 from cosim.starter.inspected_fmu import InspectedFmu
 from cosim.starter.probe_run import MORE, ProbeRun
 from cosim.starter.starter_roles import PlantRoles
@@ -89,7 +89,7 @@ def _can_be_effort(signal: GuessedSignal) -> bool:
     mass flow nor an ambient pressure drives a train.
     """
     has_unit = signal.meaning is None or any(fits(signal, unit) for unit in ("N", "1"))
-    return signal.type in FLOATING_TYPES and has_unit and not acts_from_outside(signal)
+    return signal.type in FLOATING_TYPES and has_unit and not signal.acts_from_outside
 
 
 @dataclass

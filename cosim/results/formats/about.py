@@ -35,7 +35,7 @@ def signals_of(result: ResultData) -> list[SignalInfo]:
     return [known.get(name, SignalInfo(name)) for name in column_names(result.table)[1:]]
 
 
-SIGNAL_KEYS = (
+_SIGNAL_KEYS = (
     "unit",
     "si_unit",
     "display_unit",
@@ -58,7 +58,7 @@ def signal_texts(signal: SignalInfo, is_own: bool) -> dict[str, str]:
     own = {"unit": signal.declared_unit, "si_unit": signal.unit} if is_own else {"si_unit": None}
     scale = None if signal.display_scale is None else " ".join(map(repr, signal.display_scale))
     known = {**asdict(signal), "display_scale": scale, "can_be_missing": signal.can_be_missing or None, **own}
-    return {key: str(known[key] or "") for key in SIGNAL_KEYS}
+    return {key: str(known[key] or "") for key in _SIGNAL_KEYS}
 
 
 def signal_of_texts(name: str, texts: Mapping[str, str | None]) -> SignalInfo:

@@ -16,13 +16,14 @@ import numpy as np
 import scipy
 
 from cosim.results.declared_units import in_own_units, own_units
-from cosim.results.formats.about import SIGNAL_KEYS, bring_to_si, signal_of_texts, signal_texts, signals_of
+from cosim.results.formats.about import bring_to_si, signal_of_texts, signal_texts, signals_of
 from cosim.results.formats.format import Format
 from cosim.results.record_rows import TELEGRAM_ROWS
-from cosim.results.result_data import BaliseRecord, ResultData
+from cosim.results.result_data import BaliseRecord, ResultData, SignalInfo
 from cosim.results.table_layout import table_of
 
 _RESERVED = ("time", "units", "signals", "events")
+_KEYS = tuple(signal_texts(SignalInfo(""), is_own=False))
 
 
 _MAX_LENGTH = 63  # namelengthmax of MATLAB
@@ -81,7 +82,7 @@ def _texts(value: Any, count: int) -> list[str]:
 
 
 def _signals_struct(texts: Mapping[str, Mapping[str, str]], legal: Mapping[str, str]) -> dict[str, np.ndarray]:
-    columns = {key: _cells([says[key] for says in texts.values()]) for key in SIGNAL_KEYS}
+    columns = {key: _cells([says[key] for says in texts.values()]) for key in _KEYS}
     return {"variable": _cells([legal[name] for name in texts]), "name": _cells(list(texts)), **columns}
 
 
@@ -98,7 +99,7 @@ def _events_struct(events: Sequence[BaliseRecord]) -> dict[str, np.ndarray]:
 def _read_signals(struct: Mapping[str, Any]) -> tuple[list[str], dict[str, dict[str, str | None]]]:
     """Names of the variables, and what the file says of each signal; an older file says less."""
     variables = _texts(struct["variable"], 0)
-    columns = {key: _texts(struct[key], len(variables)) for key in ("name", *SIGNAL_KEYS) if key in struct}
+    columns = {key: _texts(struct[key], len(variables)) for key in ("name", *_KEYS) if key in struct}
     rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
     return variables, {row["name"]: {**row} for row in rows}
 

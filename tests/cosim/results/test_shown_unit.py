@@ -21,7 +21,7 @@ from cosim.report.live.still_panels import still_panels
 from cosim.report.page.run_sections import signals_table
 from cosim.results.load_result import load_result
 from cosim.results.result import Result, SignalInfo
-from cosim.results.shown_unit import ShownUnit, own_scale, shared_unit, shown_unit
+from cosim.results.shown_unit import ShownUnit, own_scale, shared_unit
 from cosim.results.table_layout import table_of
 from fmus.fmi.units import Units
 from plant_models.hybrid.units import conversion, parse_unit
@@ -44,7 +44,8 @@ def test_a_unit_that_cannot_be_meant_is_not_shown() -> None:
     for display in ("kN", "furlong", "", None):
         assert SignalInfo("a", "m/s", display).shown == ShownUnit("m/s", kept="m/s")
     assert SignalInfo("a", "m/s", "kN", declared_unit="km/h").shown.name == "km/h"
-    assert shown_unit("m", ["x"], (0.0, 0.0)).name == shown_unit("m", ["x"], (float("nan"), 0.0)).name == "m"
+    for factor in (0.0, -1.0, float("nan")):
+        assert ShownUnit.first_of("m", ["x"], (factor, 0.0)).name == "m"
 
 
 def test_an_axis_has_the_unit_of_all_or_that_in_which_they_are_kept() -> None:
