@@ -17,6 +17,8 @@ from fmus.plain import plain
 
 _FIRST_KEPT = _LAST_KEPT = 200
 _LONGEST_TEXT = 2000  # letters
+OF_THE_RUN = "not said by the FMU: "
+"""How a message begins that a run adds to those of an FMU, and tells as a note."""
 STATUSES = ("ok", "warning", "discard", "error", "fatal", "pending")
 OMITTED = "omitted"
 """Status of the line that stands for messages that were not kept."""

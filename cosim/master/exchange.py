@@ -7,21 +7,52 @@ import numpy as np
 from cosim.coupling.feedthrough import declared_feedthrough
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
-from cosim.diagnostics.messages import MessageLog
+from cosim.diagnostics.messages import OF_THE_RUN, MessageLog
 from cosim.errors import RunError
 
+_LEFT = (
+    f"{OF_THE_RUN}it refuses to be read in Initialization Mode, which FMI demands of it; so it was initialised once "
+    "for each value of its inputs, and read behind that"
+)
 
-def exchange_in_initialization(plan: Plan) -> None:
-    """Exchange once in Initialization Mode, where every output may have changed with every input.
+
+class ExchangeInInitialization:
+    """Exchanges in Initialization Mode, where every output may have changed with every input.
+
+    One that refuses to be read there leaves it at once, and is initialised again where its inputs have other values.
 
     Args:
-        plan: of the run.
+        plan: of the run, all components in Initialization Mode.
+        start_time, stop_time: as they were initialised [s].
     """
-    for step in plan.steps:
-        step.write()
-        step.read()
-    for relay in plan.relays:
-        relay()
+
+    def __init__(self, plan: Plan, start_time: float, stop_time: float) -> None:
+        self._plan, self._times = plan, (start_time, stop_time)
+        self._left = dict[str, np.ndarray]()  # the inputs that each was initialised with
+
+    def __call__(self) -> None:
+        """Exchange once."""
+        for step in self._plan.steps:
+            step.inputs.gather_now()
+            if not self.has_left(step):
+                step.inputs.send()
+                if not _read_or_initialised_again(step, *self._times):
+                    step.component.note(_LEFT, "warning")
+                    self._left[step.component.name] = step.inputs.buffer.copy()
+        for relay in self._plan.relays:
+            relay()
+
+    def has_left(self, step: PlannedComponent) -> bool:
+        """Whether a component is behind Initialization Mode; then it is there with the inputs that were gathered.
+
+        Args:
+            step: of the plan.
+        """
+        name = step.component.name
+        if name in self._left and not _is_equal(step, self._left[name]):
+            _initialise_again(step, *self._times)
+            self._left[name] = step.inputs.buffer.copy()
+        return name in self._left
 
 
 class ExchangeAtInstant:
@@ -37,7 +68,7 @@ class ExchangeAtInstant:
     """
 
     def __init__(self, plan: Plan, start_time: float, stop_time: float) -> None:
-        self._plan, self._start_time, self._stop_time = plan, start_time, stop_time
+        self._plan, self._times = plan, (start_time, stop_time)
         self._acted_on = [_acted_on_at_once(plan, step) for step in plan.steps]
         self._read = [step.outputs.copy() for step in plan.steps]
 
@@ -66,30 +97,41 @@ class ExchangeAtInstant:
         Raises:
             RunError: it cannot be read anyway.
         """
-        component = step.component
-        own, component.messages = component.messages, MessageLog(component.name)  # a refusal is no fault
-        try:
-            step.read()
-            return True
-        except RunError as error:
-            component.messages = own
-            try:
-                self._initialise_again(step)
-            except RunError:
-                raise error from None
-            return False
-        finally:
-            component.messages = own
+        return _read_or_initialised_again(step, *self._times)
 
-    def _initialise_again(self, step: PlannedComponent) -> None:
-        component = step.component
-        component.reset()
-        for name, value in list(component.starts.items()):
-            component.set_start(name, value)
-        component.enter_initialization(self._start_time, self._stop_time)
-        step.inputs.send()
-        component.exit_initialization()
+
+def _read_or_initialised_again(step: PlannedComponent, start_time: float, stop_time: float) -> bool:
+    """Read a component; whether it took it. One that did not is initialised again and read behind that.
+
+    Raises:
+        RunError: it cannot be read anyway.
+    """
+    component = step.component
+    own, component.messages = component.messages, MessageLog(component.name)  # a refusal is no fault
+    try:
         step.read()
+        return True
+    except RunError as error:
+        component.messages = own
+        try:
+            _initialise_again(step, start_time, stop_time)
+        except RunError:
+            raise error from None
+        return False
+    finally:
+        component.messages = own
+
+
+def _initialise_again(step: PlannedComponent, start_time: float, stop_time: float) -> None:
+    """Reset a component, and bring it behind Initialization Mode with the inputs that were gathered."""
+    component = step.component
+    component.reset()
+    for name, value in list(component.starts.items()):
+        component.set_start(name, value)
+    component.enter_initialization(start_time, stop_time)
+    step.inputs.send()
+    component.exit_initialization()
+    step.read()
 
 
 def _is_equal(step: PlannedComponent, sent: np.ndarray) -> bool:

@@ -7,17 +7,17 @@ is searched for by Newton's method on the values that are fed back; setting inpu
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
+from cosim.diagnostics.messages import OF_THE_RUN
 from cosim.errors import RunError
 from cosim.master.algorithms.acceleration import Newton
 from cosim.master.algorithms.history import shown
 from cosim.master.algorithms.links import interface, plan_links
-from cosim.master.exchange import ExchangeAtInstant, exchange_in_initialization
+from cosim.master.exchange import ExchangeAtInstant, ExchangeInInitialization
 
 MAX_ROUNDS = 100
 _PLAIN_ROUNDS = (10, 30)
@@ -32,8 +32,8 @@ TOLERANCE = 1e-12
 """A value that moves by less than this share of itself has settled: a few roundings of a double."""
 
 _REFUSED = (
-    "not said by the FMU: it refuses to be read between a set and its next step (FMI 2.0.5, 4.2.4), so outputs that "
-    "follow an input at once show the mean of the input over the step"
+    f"{OF_THE_RUN}it refuses to be read between a set and its next step (FMI 2.0.5, 4.2.4), so outputs that follow an "
+    "input at once show the mean of the input over the step"
 )
 
 _JUMP = 1e-6
@@ -60,11 +60,12 @@ def initialise(plan: Plan, start_time: float, stop_time: float, initialised: Cal
     """
     for step in plan.steps:
         step.component.enter_initialization(start_time, stop_time)
-    settling = _Settling(plan)
+    leaving = ExchangeInInitialization(plan, start_time, stop_time)
+    settling = _Settling(plan, leaving)
     changing = settling.run()
     if changing:
         raise _changes_when_read(plan, start_time) or _unsettled(plan, changing, settling.residuals, start_time)
-    _leave_initialization(plan)
+    _leave_initialization(plan, leaving)
     initialised()
     rounds = settling.rounds
     settling.exchange = exchange = ExchangeAtInstant(plan, start_time, stop_time)
@@ -92,14 +93,15 @@ def _begin_lines(exchange: ExchangeAtInstant, step: PlannedComponent, start_time
         passes[:] = False
 
 
-def _leave_initialization(plan: Plan) -> None:
+def _leave_initialization(plan: Plan, exchange: ExchangeInInitialization) -> None:
     """All components into step mode, each with what the ones before it gave, and what jumped on the way noted."""
     plan.begin_step()
     for step in plan.steps:
         step.inputs.gather()
-        step.inputs.send()
-        step.component.exit_initialization()
-        step.read()
+        if not exchange.has_left(step):
+            step.inputs.send()
+            step.component.exit_initialization()
+            step.read()
     plan.note_jumps()
     for relay in plan.relays:
         relay()
@@ -112,9 +114,8 @@ class _Settling:
     it took and `residuals` by how much what is fed back changed in each, as a share of its first size.
     """
 
-    def __init__(self, plan: Plan) -> None:
-        self.plan, self.rounds = plan, 0
-        self.exchange: Callable[[], None] = partial(exchange_in_initialization, plan)
+    def __init__(self, plan: Plan, exchange: Callable[[], None]) -> None:
+        self.plan, self.rounds, self.exchange = plan, 0, exchange
         self.residuals: list[float] = []
         self._columns = interface(plan_links(plan))
         self._jumps = ~plan.continuous[self._columns]

@@ -16,7 +16,7 @@ from cosim.balises.localiser import SHORTEST_PART
 from cosim.components.component import Component
 from cosim.coupling.connection import Connection
 from cosim.diagnostics.call_log import CallLog
-from cosim.diagnostics.messages import FAULTS, in_order
+from cosim.diagnostics.messages import FAULTS, OF_THE_RUN, in_order
 from cosim.errors import CosimError
 from cosim.evaluation.result_warnings import result_warnings
 from cosim.evaluation.spec import ReportSpec
@@ -138,9 +138,12 @@ def _missed_samples(components: Mapping[str, Component]) -> Iterator[str]:
             yield f"{name}: {count} measurements were missing at its samples, and left out."
 
 
-def _differences_taken(components: Mapping[str, Component]) -> Iterator[str]:
-    """Notes of directional derivatives that the solver of a component did not use."""
+def _gone_round(components: Mapping[str, Component]) -> Iterator[str]:
+    """Notes of what components refused, and of directional derivatives that a solver did not use."""
     for name, component in components.items():
+        for message in component.messages.kept():
+            if message.text.startswith(OF_THE_RUN):
+                yield f"{name}: {message.text.removeprefix(OF_THE_RUN)}."
         solver = solver_of(component.slave)
         if solver is not None and solver.motion is not None and solver.motion.told:
             yield f"{name}: the solver takes {solver.motion.jacobian}."
@@ -286,7 +289,7 @@ def _summary(
     gaps |= _counted_gaps(ready.coupled.connections, ready.checked.certificates, result, start)
     certificates, beyond = findings_after(ready.checked.certificates, gaps)
     remarks.warn(*beyond)
-    remarks.note(*_missed_samples(ready.coupled.components), *_differences_taken(ready.coupled.components))
+    remarks.note(*_missed_samples(ready.coupled.components), *_gone_round(ready.coupled.components))
     found = _balise_summary(ready.services, gap)
     found |= {"certificates": certificates, "premises": premises, "warnings": remarks.warnings, "notes": remarks.notes}
     found |= evaluated_summary(result, spec)

@@ -57,6 +57,7 @@ def linear_fmu(
     early: bool = False,
     frozen_outputs: bool = False,
     strict: bool = False,
+    closed: bool = False,
     declare_dependencies: bool = True,
     once_per_process: bool = False,
     needs_tool: bool = False,
@@ -83,6 +84,7 @@ def linear_fmu(
         early: FMI 3.0: it may return early at an inner instant where the importer asks for it.
         frozen_outputs: outputs do not follow inputs that are set between steps, as the standard permits.
         strict: between steps it refuses to be read after an input was set (FMI 2.0.5, 4.2.4), and is lost then.
+        closed: it refuses to be read in Initialization Mode.
         declare_dependencies: False: nothing is said of direct dependencies.
         once_per_process, needs_tool: declared only.
     """
@@ -131,6 +133,7 @@ def linear_fmu(
         "HAS_DIRECTIONAL": directional and version > 1,
         "FROZEN_OUTPUTS": frozen_outputs,
         "REFUSES_GET_AFTER_SET": strict,
+        "REFUSES_GET_AT_START": closed,
         "CAN_SAVE": state,
         "A": a.ravel().tolist(),
         "B": b.ravel().tolist(),
@@ -213,6 +216,7 @@ DEFAULTS: dict[str, Define] = {
     "FROZEN_OUTPUTS": False,
     "HIDES_LAST_TIME": False,
     "REFUSES_GET_AFTER_SET": False,
+    "REFUSES_GET_AT_START": False,
     "MIGHT_RETURN_EARLY": True,
     "TAKES_TOLERANCE": False,
 }

@@ -234,6 +234,51 @@ class Lenient(Strict):
     setFloat64 = _set
 
 
+class Open(Mock):
+    """``x' = u - x`` and ``y = x + u / 2``, readable at any time."""
+
+    inputs: ClassVar[dict[str, Any]] = {"u": 0.0}
+    outputs: ClassVar[dict[str, Any]] = {"y": 0.0}
+    memory = ("v", "x", "time", "stepping")
+    closed = False
+
+    def begin(self) -> None:
+        self.x, self.stepping = {"x": 1.0}, False
+
+    def exitInitializationMode(self) -> None:
+        self.stepping = True
+
+    def compute(self) -> None:
+        assert self.stepping or not self.closed, "get before the end of initialisation"
+        self.v["y"] = self.x["x"] + 0.5 * self.v["u"]
+
+    def move(self, t: float, h: float) -> None:
+        self.x = {"x": self.x["x"] + h * (self.v["u"] - self.x["x"])}
+
+
+class Closed(Open):
+    """The same, which refuses to be read in Initialization Mode, as FMUs of ControlBuild do."""
+
+    closed = True
+
+
+@pytest.mark.parametrize("kinds", [(Closed, Open), (Open, Closed), (Closed, Closed)])
+@pytest.mark.parametrize("names", [("a", "b"), ("b", "a")])
+def test_what_cannot_be_read_in_initialization_mode_has_the_numbers_of_what_can(
+    names: tuple[str, str], kinds: tuple[type[Open], type[Open]]
+) -> None:
+    """Each acts on the other at once: ``y = 1 + y' / 2`` of both is 2 at the start."""
+    pairs = [("a.y", "b.u"), ("b.y", "a.u")]
+    parts = [component(kind(), name) for kind, name in zip(kinds, names, strict=True)]
+    closed = run(parts, pairs, 0.1, 5)
+    opened = run([component(Open(), name) for name in names], pairs, 0.1, 5)
+    for name in names:
+        assert closed[f"{name}.y"][0] == pytest.approx(2.0, abs=1e-11)
+        assert closed[f"{name}.y"].tolist() == opened[f"{name}.y"].tolist()
+    for part, kind in zip(parts, kinds, strict=True):
+        assert ("refuses to be read in Initialization Mode" in part.messages.reason) == kind.closed
+
+
 @pytest.mark.parametrize("algorithm", [GaussSeidel, Jacobi])
 @pytest.mark.parametrize("names", [("a", "b"), ("b", "a")])
 def test_what_no_input_acts_on_at_once_is_not_read_after_it_was_set(algorithm: Any, names: tuple[str, str]) -> None:

@@ -37,20 +37,20 @@ KINDS = ("mute", "declared", "direct")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """FMUs ``exact1`` to ``exact3``; and of each kind a ``strict_`` and a ``lenient_`` one with ``x' = u - x`` and
-    ``y = x + d u``: ``mute`` about its dependencies, ``direct`` with d = 0.5, which it declares.
+    """FMUs ``exact1`` to ``exact3``; and of each kind a ``strict_``, a ``closed_`` and a ``lenient_`` one with
+    ``x' = u - x`` and ``y = x + d u``: ``mute`` about its dependencies, ``direct`` with d = 0.5, which it declares.
     """
     place = tmp_path_factory.mktemp("strict")
     for version in (1, 2, 3):
         awkward_fmu(place, "exact-steps", f"exact{version}", version=version)  # type: ignore[arg-type]
     for kind in KINDS:
-        for strict in (True, False):
+        for manner in ("strict", "closed", "lenient"):
             d = 0.5 if kind == "direct" else 0.0
-            name = f"{'strict' if strict else 'lenient'}_{kind}"
+            name, how = f"{manner}_{kind}", {"strict": manner == "strict", "closed": manner == "closed"}
             declares = kind != "mute"
             linear_fmu(
-                place, name, -1, 1, 1, d, version=2, strict=strict, declare_dependencies=declares, inputs=["u"],
-                outputs=["y"], x0=[0.5],
+                place, name, -1, 1, 1, d, version=2, declare_dependencies=declares, inputs=["u"],
+                outputs=["y"], x0=[0.5], **how,
             )  # fmt: skip
     return place
 
@@ -103,7 +103,8 @@ def test_a_strict_fmu_runs_in_every_coupling_with_the_numbers_of_a_lenient_one(
     """Inputs from each other, from itself, from a table, or from nowhere, by both steppers."""
     names = [f"part{i}" for i in range(len(kinds))]
     tables = []
-    for manner, stepper in [("lenient", "python"), ("strict", "python"), ("strict", "compiled")]:
+    manners = ("strict", "closed")
+    for manner, stepper in [("lenient", "python"), *((m, s) for m in manners for s in STEPPERS)]:
         parts: list[Any] = [load_fmu(folder / f"{manner}_{k}.fmu", n) for k, n in zip(kinds, names, strict=True)]
         pairs = []
         for name, source in zip(names, sources, strict=False):

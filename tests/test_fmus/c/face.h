@@ -84,6 +84,8 @@ static bool set_categories(Host *host, bool on, size_t count, const char *const 
 
 /* Whether variables may be read now (FMI 2.0.5, 4.2.4); an instance that was read when they may not be is lost. */
 static bool gettable(Instance *instance) {
+    if (REFUSES_GET_AT_START && instance->now.mode == INITIALIZATION)
+        return false;
     if (!REFUSES_GET_AFTER_SET || instance->now.mode != STEP_MODE || !instance->now.set)
         return true;
     SAY(&instance->host, ERROR, "logStatusError", "a get after a set without a step between them");
