@@ -69,6 +69,7 @@ def read_description(source: Path) -> ModelDescription:
             variables[entry.get("name")].intermediateUpdate = entry.get("intermediateUpdate") in TRUE
         for entry in root.iterfind("ModelVariables/Clock"):
             _complete_clock(variables[entry.get("name")], entry)
+        _leave_out_reciprocals(description, root)
     if description.generationTool == OWN_TOOL:
         _complete_annotations(description, ElementTree.fromstring(_text(source)))
     return description
@@ -93,6 +94,15 @@ def _alone(source: Path) -> BytesIO:
     with zipfile.ZipFile(source) as archive, zipfile.ZipFile(alone, "w") as copy:
         copy.writestr(FILE, archive.read(FILE))
     return alone
+
+
+def _leave_out_reciprocals(description: ModelDescription, root: ElementTree.Element) -> None:
+    """Display units that are ``factor / value`` (``inverse`` of FMI 3.0), which fmpy takes for ``factor * value``."""
+    for entry in root.iterfind("UnitDefinitions/Unit"):
+        left_out = {display.get("name") for display in entry.iterfind("DisplayUnit") if display.get("inverse") in TRUE}
+        for unit in description.unitDefinitions if left_out else ():
+            if unit.name == entry.get("name"):
+                unit.displayUnits = [display for display in unit.displayUnits if display.name not in left_out]
 
 
 def _complete_clock(clock: ModelVariable, entry: ElementTree.Element) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -13,12 +13,24 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 from cosim.drawing.style import MARK, ZONE
 from cosim.evaluation.spec import ReportSpec
 from cosim.results.result import Result
+from cosim.results.shown_unit import ShownUnit, shared_unit
 from fmus.tables.numbers import number
 
 _BUCKETS = 1500  # more points than a picture has columns add nothing but time and bytes
 _MARGINS = 1.0  # width of a figure beside its axes [inch]
 _LETTER_WIDTH, _HANDLE_WIDTH = 0.069, 0.66  # of a letter and of a line with the space around it in a legend [inch]
 FAR = 50.0  # values are cut this many axis heights away, so that a line to 1e300 can still be drawn
+
+
+def speed_unit(result: Result, names: Iterable[str | None]) -> ShownUnit:
+    """The unit of an axis of speeds: that in which all are shown, else m/s; km/h where no signal has a unit.
+
+    Args:
+        result: the run. names: of the signals; what was not recorded does not count.
+    """
+    known = {signal.name: signal.shown for signal in result.signals if signal.unit != "1"}
+    found = [known[name] for name in names if name in known]
+    return shared_unit(found) if found else ShownUnit("km/h", 1.0 / 3.6, 0.0, "m/s")
 
 
 def thin(time: np.ndarray, values: np.ndarray, buckets: int = _BUCKETS) -> tuple[np.ndarray, np.ndarray]:

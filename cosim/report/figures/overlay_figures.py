@@ -12,14 +12,13 @@ from matplotlib.figure import Figure
 
 from cosim.drawing.style import TIME, TRUE_LINE, new_figure, picture, run_line, styled
 from cosim.evaluation.roles import Quantity, estimate, estimation_error, label, recorded
-from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, thin
+from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, speed_unit, thin
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
 from cosim.report.figures.scales import bounded, value_limits
 from cosim.report.overlay.overlaid_runs import OverlayRun, observers_of, one_each
 from cosim.results.shown_unit import ShownUnit, shared_unit
 
 WIDTH, _FIRST_PANEL, _NEXT_PANEL = 8.2, 3.3, 2.2  # inches
-KMH = 3.6  # km/h in a m/s
 Panel = tuple[str, dict[int, str]]
 """Title of a panel, and the observer of each run in it by index of the run."""
 
@@ -67,7 +66,7 @@ def draw_overlays(runs: Sequence[OverlayRun], signals: Sequence[str] = (), kind:
 
 @styled
 def _true_speed_figure(runs: Sequence[OverlayRun]) -> Figure | None:
-    """True speed of all runs in km/h, or None without any."""
+    """True speed of all runs, or None without any."""
     found = [
         (i, run, speed)
         for i, run in enumerate(runs)
@@ -76,10 +75,11 @@ def _true_speed_figure(runs: Sequence[OverlayRun]) -> Figure | None:
     if not found:
         return None
     ax = _axes(runs, [("", {})])[0]
-    limits = value_limits([KMH * bounded(speed) for _, _, speed in found], [])
+    unit = shared_unit(speed_unit(run.result, [run.spec.true_speed]) for _, run, _ in found)
+    limits = value_limits([unit.values(bounded(speed)) for _, _, speed in found], [])
     for i, run, speed in found:
-        curve(ax, run.result.time, KMH * bounded(speed), limits, label=run.label, **run_line(i))
-    return _finished([ax], "Speed [km/h]", limits)
+        curve(ax, run.result.time, unit.values(bounded(speed)), limits, label=run.label, **run_line(i))
+    return _finished([ax], f"Speed [{unit.name}]", limits)
 
 
 @styled

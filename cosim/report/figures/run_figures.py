@@ -24,25 +24,26 @@ from cosim.drawing.style import (
 from cosim.evaluation.indicators import on_intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import curve, shade_zones
+from cosim.report.figures.drawing import curve, shade_zones, speed_unit
 from cosim.report.figures.panel import Panel, any_estimate
 from cosim.report.figures.scales import bounded, curve_size, slip_in_percent, value_limits
 from cosim.results.result import Result
+from cosim.results.shown_unit import ShownUnit
 
-KMH = 3.6  # km/h in a m/s
+_PLAIN, _KN = ShownUnit(), ShownUnit("kN", 1e3, 0.0, "N")
 _OTHER_LINE: dict[str, Any] = {"color": BLACK, "linewidth": 1.2}
 _DASHES: tuple[Any, ...] = ("--", "-.", (0, (6, 2)), (0, (3, 1, 1, 1, 1, 1)))  # of other trains
 _STRIP = 0.055  # height of an indicator's strip as a share of the axes
 
 
-def _estimates(result: Result, spec: ReportSpec, signal: str, factor: float) -> dict[str, np.ndarray]:
+def _estimates(result: Result, spec: ReportSpec, signal: str, unit: ShownUnit) -> dict[str, np.ndarray]:
     found = {observer: estimate(result, observer, signal) for observer in spec.observers}
-    return {observer: factor * bounded(values) for observer, values in found.items() if values is not None}
+    return {observer: unit.values(bounded(values)) for observer, values in found.items() if values is not None}
 
 
-def _scaled(result: Result, name: str | None, factor: float) -> list[np.ndarray]:
+def _scaled(result: Result, name: str | None, unit: ShownUnit) -> list[np.ndarray]:
     values = recorded(result, name)
-    return [] if values is None else [factor * bounded(values)]
+    return [] if values is None else [unit.values(bounded(values))]
 
 
 def _draw(
@@ -104,7 +105,7 @@ class _RunPanel(Panel):
 
 
 class SpeedPanel(_RunPanel):
-    """True speed, odometer, reference, other trains and estimates in km/h, against time."""
+    """True speed, odometer, reference, other trains and estimates in the unit in which they are shown, against time."""
 
     name = "speed"
     title = "Speed"
@@ -114,9 +115,11 @@ class SpeedPanel(_RunPanel):
 
     @classmethod
     def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
-        true, odometer = _scaled(result, spec.true_speed, KMH), _scaled(result, spec.odometer, KMH)
-        reference, estimates = _scaled(result, spec.speed_reference, KMH), _estimates(result, spec, "speed", KMH)
-        others = {train: _scaled(result, f"{train}.speed", KMH) for train in spec.other_trains}
+        names = [f"{name}.speed" for name in (*spec.observers, *spec.other_trains)]
+        unit = speed_unit(result, [spec.true_speed, spec.odometer, spec.speed_reference, *names])
+        true, odometer = _scaled(result, spec.true_speed, unit), _scaled(result, spec.odometer, unit)
+        reference, estimates = _scaled(result, spec.speed_reference, unit), _estimates(result, spec, "speed", unit)
+        others = {train: _scaled(result, f"{train}.speed", unit) for train in spec.other_trains}
         limits = value_limits([*true, *reference, *chain(*others.values())], odometer + list(estimates.values()))
         shade_zones(ax, spec)
         _draw(ax, result, true, limits, "true", TRUE_LINE)
@@ -126,7 +129,7 @@ class SpeedPanel(_RunPanel):
             line = _OTHER_LINE | {"linestyle": _DASHES[i % len(_DASHES)]}
             _draw(ax, result, found, limits, label(spec, train), line)
         _draw_estimates(ax, result, spec, estimates, limits)
-        ax.set_ylabel("Speed [km/h]")
+        ax.set_ylabel(f"Speed [{unit.name}]")
 
 
 class SlipPanel(_RunPanel):
@@ -141,8 +144,8 @@ class SlipPanel(_RunPanel):
 
     @classmethod
     def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
-        true = [slip_in_percent(values) for values in _scaled(result, spec.true_slip, 1.0)]
-        estimates = {o: slip_in_percent(values) for o, values in _estimates(result, spec, "slip", 1.0).items()}
+        true = [slip_in_percent(values) for values in _scaled(result, spec.true_slip, _PLAIN)]
+        estimates = {o: slip_in_percent(values) for o, values in _estimates(result, spec, "slip", _PLAIN).items()}
         settled = result.time >= spec.evaluate_after
         limits = value_limits([v[settled] for v in true], [v[settled] for v in estimates.values()])
         shade_zones(ax, spec)
@@ -163,8 +166,8 @@ class AdhesionPanel(_RunPanel):
 
     @classmethod
     def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
-        true = _scaled(result, spec.true_adhesion_force, 1e-3)
-        estimates = _estimates(result, spec, "adhesion_force", 1e-3)
+        true = _scaled(result, spec.true_adhesion_force, _KN)
+        estimates = _estimates(result, spec, "adhesion_force", _KN)
         limits = value_limits(true, list(estimates.values()))
         shade_zones(ax, spec)
         true_line = TRUE_LINE_ABOVE if any(map(_is_noisy, estimates.values())) else TRUE_LINE

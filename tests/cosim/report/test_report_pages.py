@@ -143,6 +143,24 @@ def test_estimates_lie_above_what_is_measured_noisy_ones_too(result: Result) -> 
     assert height["true"] < height["odometer"] < min(height[name] for name in estimates)
 
 
+@pytest.mark.parametrize(
+    ("shown", "unit", "factor"), [("km/h", "km/h", 3.6), (None, "m/s", 1.0), ("mixed", "m/s", 1.0)]
+)
+def test_a_picture_of_speeds_is_in_the_unit_of_all_of_them(
+    shown: str | None, unit: str, factor: float, result: Result
+) -> None:
+    own = {"discrete_uio.speed": "mph"} if shown == "mixed" else {}
+    signals = [
+        replace(s, display_unit=own.get(s.name, None if shown == "mixed" else shown)) if s.unit == "m/s" else s
+        for s in result.signals
+    ]
+    ax = SpeedPanel.draw(replace(result, signals=signals), synthetic_spec(), None)
+    true = next(line for line in ax.get_lines() if line.get_label() == "true")
+    assert ax.get_ylabel() == f"Speed [{unit}]"
+    top = float(np.nanmax(np.asarray(true.get_ydata(), float)))
+    assert top == pytest.approx(factor * result["locomotive.speed"].max(), rel=1e-9)
+
+
 def limits(ax: Axes) -> tuple[float, float]:
     return ax.get_ylim()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -136,6 +137,21 @@ def test_a_run_shows_what_its_fmu_wants(changes: list[tuple[str, str]], name: st
     assert f"{last:.3g}" in str(outcome.result)
     outcome.write(tmp_path / "out", report=False)
     assert load_result(tmp_path / "out").info("fmu.v").shown == outcome.result.info("fmu.v").shown
+
+
+@pytest.mark.compiler
+def test_a_reciprocal_is_no_unit_to_show(tmp_path: Path) -> None:
+    """FMI 3.0: ``inverse`` shows ``factor / value``, as litres per 100 km are shown of km per litre."""
+    fmu = linear_fmu(tmp_path, "train", [[0]], [[1]], [[1]], [[0]], inputs=["a"], outputs=["v"], units={"v": "m/s"})
+    definition = '<DisplayUnit name="Ritz" factor="2.0" inverse="true"/><DisplayUnit name="Tacho" factor="3.0"/></Unit>'
+    for display, shown in (("Ritz", "m/s"), ("Tacho", "Tacho")):
+        copy = _rewritten(
+            Path(shutil.copy(fmu, tmp_path / f"{display}.fmu")),
+            ("</Unit>", definition),
+            ('unit="m/s"', f'unit="m/s" displayUnit="{display}"'),
+        )
+        outcome = cosim.Scenario(stop=1.0, step=0.5).add("fmu", fmu=copy, parameters={"a": 1.0}).run()
+        assert outcome.result.info("fmu.v").shown.name == shown
 
 
 def _result() -> Result:
