@@ -51,7 +51,7 @@ ARGUMENTS = (
     ArgumentGroup(
         (
             argument("--signals", nargs="+", action="extend", metavar="PATTERN", help="these only, e.g. 'train.*'"),
-            argument("--si", action="store_true", help="CSV in SI also where FMUs declare other units"),
+            argument("--si", action="store_true", help="in SI also where FMUs declare other units"),
             argument("--no-units", action="store_true", help="CSV headings without units, in SI"),
         ),
         "a result",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ from cosim.evaluation.stored_spec import is_guessed, spec_of
 from cosim.report.overlay.overlaid_runs import make_runs
 from cosim.report.page.overlay import write_overlay_page
 from cosim.report.page.run_page import write_report, write_report_page
+from cosim.results.declared_units import in_si_only
 from cosim.results.load_result import load_result
 from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
@@ -47,6 +49,7 @@ ARGUMENTS = (
     argument("--out", metavar="FILE.html", help=f"the page (default: report.html in DIR, or {OVERLAY} for several)"),
     argument("--labels", metavar="A,B", help="texts for the runs, separated by commas (default: names of the folders)"),
     repeated("--signals", "PATTERN", "for several runs: recorded signals to draw as well, e.g. 'train.*'"),
+    argument("--si", action="store_true", help="signals in SI also where FMUs want other units"),
     FIGURE_FILES,
 )
 
@@ -56,6 +59,8 @@ def execute(options: argparse.Namespace) -> Output:
     paths = [Path(text) for text in options.results]
     labels = _labels(options.labels, paths)
     results = [load_result(path) for path in paths]
+    if options.si:
+        results = [replace(result, signals=in_si_only(result.signals)) for result in results]
     specs = [spec_of(result, label) for result, label in zip(results, labels, strict=True)]
     for path, result, spec in zip(paths, results, specs, strict=True):
         if is_guessed(result):

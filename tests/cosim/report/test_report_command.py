@@ -44,6 +44,15 @@ def test_a_report_is_made_again(runs: Path, capsys: pytest.CaptureFixture[str]) 
     assert capsys.readouterr().out.strip() == f"report: {page}"
 
 
+def test_a_page_is_in_si_where_that_is_asked_for(runs: Path, tmp_path: Path) -> None:
+    pages = {}
+    for name, more in (("own", []), ("si", ["--si"])):
+        assert main(["report", str(runs / "one"), "--out", str(tmp_path / f"{name}.html"), *more]) == 0
+        pages[name] = (tmp_path / f"{name}.html").read_text(encoding="utf-8").partition('id="live-data"')[2]
+    assert '"shown": {"unit": "km/h"' in pages["own"] or '"shown":{"unit":"km/h"' in pages["own"]
+    assert "km/h" not in pages["si"].partition("</script>")[0]
+
+
 def test_several_over_each_other(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     arguments = [str(runs / "one"), str(runs / "two"), "--labels", "10 ms, 50 ms", "--signals", "driver.*"]
