@@ -13,6 +13,7 @@ from cosim.errors import CosimError, OutputError
 from cosim.results.block_file import BLOCK_FILE, read_block
 from cosim.results.formats.growing_npy import growing_header, read_grown
 from cosim.results.formats.known_formats import usual_file
+from cosim.results.result_data import ResultData
 from cosim.results.results_folder import SUMMARY, read_results, remove_report, write_results
 from cosim.results.summary_file import read_summary, write_summary
 from cosim.results.unfinished import DID_NOT_END, UNFINISHED
@@ -30,10 +31,9 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
     """
     fallback, out = Path(note["fallback"]), Path(note["out"])
     try:
-        if not (fallback / SUMMARY).exists() or not (fallback / usual_file("npy")).exists():
+        result = salvaged(fallback, reason)
+        if result is None:
             return "Nothing had been computed yet."
-        _close_unfinished(fallback, reason)
-        result = read_results(fallback)
         if fallback != out:
             write_results(result, out, note["formats"])
             remove_report(out)
@@ -46,6 +46,21 @@ def salvage(note: Mapping[str, Any], reason: str) -> str:
     if fallback != out:
         shutil.rmtree(fallback, ignore_errors=True)
     return f"What was computed is kept: {len(result.table)} rows in {out}. To see it: cosim report {out}"
+
+
+def salvaged(folder: Path, reason: str) -> ResultData | None:
+    """What was recorded in a folder that was streamed to; None where nothing had been.
+
+    Args:
+        folder: in which the rows are made a whole table. reason: why the run ended.
+
+    Raises:
+        CosimError, OSError, ValueError: a file cannot be read or written, or is none of a stream.
+    """
+    if not (folder / SUMMARY).exists() or not (folder / usual_file("npy")).exists():
+        return None
+    _close_unfinished(folder, reason)
+    return read_results(folder)
 
 
 def rescue(directory: Path) -> str:

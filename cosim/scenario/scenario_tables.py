@@ -85,8 +85,8 @@ def _starts(stated: Any) -> Any:
     return {**stated, "seed": _Seed(seed)} if isinstance(seed, float) and not math.isfinite(seed) else stated
 
 
-Isolate = Literal["no", "component"]
-"""What runs in a process of its own."""
+Isolate = Literal["no", "run", "component"]
+"""What runs in a process of its own: nothing, the whole run, each FMU by path."""
 
 
 class LimitsTable(TomlTable):
@@ -130,7 +130,7 @@ class ComponentTable(TomlTable):
     every: Annotated[int, Field(ge=1)] = 1
     substeps: Annotated[int, Field(ge=1)] = 1
     filter: FilterTable | None = None
-    isolate: Isolate | None = None
+    isolate: Literal["no", "component"] | None = None
     limits: LimitsTable | None = None
 
     @model_validator(mode="after")

@@ -162,7 +162,7 @@ class MasterKeywords(TypedDict, total=False):
     stepper: Literal["auto", "python", "compiled"]
     log_calls: bool
     call_timeout: float | None
-    isolate: Literal["no", "component"] | None
+    isolate: Literal["no", "run", "component"] | None
     record_every: int
     record_memory: float
 

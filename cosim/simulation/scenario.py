@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from cosim import ssp, studies
 from cosim.errors import CosimError
+from cosim.process.last_call import LAST_CALL
 from cosim.run.outcome import Outcome
 from cosim.run.results_manifest import read_manifest
 from cosim.run.scenario_run import run_scenario
 from cosim.run.scenario_structure import scenario_structure
 from cosim.run.streaming import ending, where_to
 from cosim.run.task import RunTask
+from cosim.runs.run_apart import run_apart
 from cosim.scenario.fmu_alone import FmuAlone, tables_of_fmu
 from cosim.scenario.includes import find_file, read_tables
 from cosim.scenario.origin import Origin
@@ -126,7 +128,7 @@ class Scenario(StatedScenario, FirstScreen):
             name: of the component: its outputs are recorded as ``name.output``.
             interpolation: ``hold`` or ``linear`` for all columns of the table, or for some by name: a command that was
                 logged is held.
-            isolate: ``component`` for a process of its own.
+            isolate: ``component`` for a process of the FMU's own, ``run`` for one of the run.
             units: what its owner knows and its description does not say, by name of the variable: ``"km/h"``, or
                 ``{"unit": "kN", "sign": -1}``, as in the table ``units`` of a scenario file.
 
@@ -274,6 +276,12 @@ class Scenario(StatedScenario, FirstScreen):
             scenario.master(log_calls=True)
         table = scenario.table()
         log = None if call_log is None else Path(call_log)
+        if table.master.isolate == "run" and not LAST_CALL.watched:
+            with self._places_named():
+                outcome = run_apart(scenario, warn or LOG.warning, None if stream is None else Path(stream), log)
+            if finished is not None:
+                finished(outcome)
+            return outcome
         for warning in self._warnings:
             (warn or LOG.warning)(warning)
         with self._places_named():
