@@ -32,8 +32,9 @@ def hides_nothing(description: ModelDescription) -> bool:
     """
     if fmi_version(description) == 1 or description.numberOfEventIndicators:
         return False
-    own = [v for v in description.modelVariables if v.causality not in ("input", "parameter", "structuralParameter")]
-    changing = [v for v in own if v.variability not in ("constant", "fixed") and v.causality != "independent"]
+    given = ("input", "parameter", "structuralParameter", "calculatedParameter", "independent")
+    own = [v for v in description.modelVariables if v.causality not in given]
+    changing = [v for v in own if v.variability not in ("constant", "fixed")]
     return all(is_continuous(v) for v in changing) and not any(v.type == "Clock" for v in description.modelVariables)
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from fmpy.fmi1 import FMICallException, fmi1EventInfo
@@ -23,17 +22,18 @@ _NAMES = {
 """Functions whose name depends on the version of FMI, by version."""
 
 
-@dataclass(frozen=True)
-class EventIteration:
+class EventIteration(NamedTuple):
     """What an FMU says at the end of one event iteration.
 
-    Args:
+    Attributes:
         again: another one is needed. terminate: it asks for the end. next_event: that it knows of [s].
+        nominals: magnitudes of its states changed.
     """
 
     again: bool
     terminate: bool
     next_event: float
+    nominals: bool = False
 
     @classmethod
     def of_first(cls, info: fmi1EventInfo) -> EventIteration:
@@ -78,6 +78,16 @@ class ModelCalls:
         self._set_time, self._set_states = self._made("SetTime"), self._made("SetContinuousStates")
         self._get_rates, self._get_indicators = self._made(self._name("rates")), self._made("GetEventIndicators")
         self._get_states, self._get_nominals = self._made("GetContinuousStates"), self._made(self._name("nominals"))
+        self._info, self._due, self._flags = (
+            fmi2EventInfo(),
+            ctypes.c_double(),
+            tuple(ctypes.c_bool() for _ in range(5)),
+        )
+        self._places: Any = ctypes.byref(self._info)
+        if version == 3:
+            self._places = tuple(ctypes.byref(place) for place in (*self._flags, self._due))
+        if version > 1:
+            self._update = self._made("NewDiscreteStates" if version == 2 else "UpdateDiscreteStates")
 
     def move(self, t: float, x: Any) -> None:
         """Set time [s] and states."""
@@ -171,14 +181,14 @@ class ModelCalls:
             self.call("EventUpdate", b"\x00", ctypes.byref(info))
             return EventIteration.of_first(info)
         if self._version == 2:
-            said = fmi2EventInfo()
-            self.call("NewDiscreteStates", ctypes.byref(said))
+            self._done(self._update, self._places)
+            said = self._info
             due = said.nextEventTime if said.nextEventTimeDefined else NEVER
-            return EventIteration(bool(said.newDiscreteStatesNeeded), bool(said.terminateSimulation), due)
-        flags = tuple(ctypes.c_bool() for _ in range(5))
-        due = ctypes.c_double()
-        self.call("UpdateDiscreteStates", *map(ctypes.byref, flags), ctypes.byref(due))
-        return EventIteration(flags[0].value, flags[1].value, due.value if flags[4].value else NEVER)
+            again, end = bool(said.newDiscreteStatesNeeded), bool(said.terminateSimulation)
+            return EventIteration(again, end, due, bool(said.nominalsOfContinuousStatesChanged))
+        self._done(self._update, *self._places)
+        again, end, nominals, _, defined = (flag.value for flag in self._flags)
+        return EventIteration(again, end, self._due.value if defined else NEVER, nominals)
 
     def completed(self) -> tuple[bool, bool]:
         """The solver completed a step that ends here: whether the FMU wants Event Mode, and the end."""
@@ -218,6 +228,9 @@ class ModelCalls:
         Raises:
             FMICallException: it did.
         """
+        if not model.noted:
+            return
+        model.noted = 0
         for place, name in enumerate(self._names):
             for _ in range(model.warnings[place]):
                 self._slave.warned(f"fmi{self._version}{name}")

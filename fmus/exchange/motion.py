@@ -8,6 +8,7 @@ anew after an event, and after a state was saved or restored, so that what follo
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -88,6 +89,7 @@ class Motion:
     def begin(self) -> None:
         """Initialisation has just ended: it stands in Event Mode."""
         self.in_event_mode, self.terminated, self.next_event = True, False, NEVER
+        self._nominals_known = False
         self._last_event, self._at_once = -NEVER, 0
         self.events = 0
         """How many happened on the way, those of inputs left out."""
@@ -106,6 +108,7 @@ class Motion:
             state: from `state`.
         """
         self.in_event_mode, self.terminated, self.next_event = state
+        self._nominals_known = False
         self.begin_anew()
 
     @property
@@ -143,9 +146,10 @@ class Motion:
         Raises:
             SolverError: it says that the next event is at no time.
         """
-        if np.isnan(update.next_event):
+        if math.isnan(update.next_event):
             raise SolverError("the FMU says that the next event is at t = nan")
         self.next_event, self.terminated = update.next_event, self.terminated or update.terminate
+        self._nominals_known &= not update.nominals
         return update.again
 
     def leave_event_mode(self) -> None:
@@ -245,7 +249,9 @@ class Motion:
         model, solver, native = self._model, self.solver, self.solver.native
         if self._anew:
             model.states(self._x)
-            solver.absolute[:] = solver.tolerance * model.nominals()
+            if not self._nominals_known:
+                solver.absolute[:] = solver.tolerance * model.nominals()
+                self._nominals_known = True
             solver.restart(t)
             self._anew = False
         if native is not None and self.follower is None:

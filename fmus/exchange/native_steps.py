@@ -33,7 +33,7 @@ class CExchange(ctypes.Structure):
         ("rates", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in ("unknowns", "knowns", "sizes", "places", "seed", "columns")),
         *((name, ctypes.c_void_p) for name in ("nominals", "scratch")),
-        *((name, ctypes.c_int64) for name in ("unknown_count", "differing")),
+        *((name, ctypes.c_int64) for name in ("unknown_count", "differing", "noted")),
         ("warnings", ctypes.c_int64 * 6),
     )
 

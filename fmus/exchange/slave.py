@@ -208,9 +208,9 @@ class CoSimulationFunctions:
 
     def _update(self, call: Callable[..., int], instance: Any, *results: int) -> int:
         status = call(instance, *results)
-        again, terminate, _, _, defined = (ctypes.c_bool.from_address(place).value for place in results[:5])
+        again, terminate, nominals, _, defined = (ctypes.c_bool.from_address(place).value for place in results[:5])
         due = ctypes.c_double.from_address(results[5]).value if defined else NEVER
-        self._motion.note(EventIteration(again, terminate, due))
+        self._motion.note(EventIteration(again, terminate, due, nominals))
         return status
 
     # -- states, see `states.StoredStates` -----------------------------------------------------------------------------

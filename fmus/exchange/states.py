@@ -123,8 +123,8 @@ class StoredStates:
             self._put_back(saved)
         else:
             status = call(instance, saved.held.value)
+            self._of.moved.restore(saved.motion)
         self._of.sent, self._of.reached = dict(saved.sent), saved.time
-        self._of.moved.restore(saved.motion)
         return status
 
     def _release(self, call: Callable[..., int], instance: Any, place: int) -> int:
@@ -192,6 +192,12 @@ class StoredStates:
         for key, content in saved.sent.items():
             if of.sent.get(key) != content:  # which leads through Event Mode
                 of.put(key, content)
+        in_event_mode, _, _ = saved.motion
+        if in_event_mode:
+            of.moved.enter_event_mode()
+        elif of.moved.in_event_mode:
+            of.moved.settle()
+        of.moved.restore(saved.motion)
 
     def _demand_whole(self) -> None:
         """Once: a step from here, and again after one under other inputs."""
@@ -208,7 +214,6 @@ class StoredStates:
                         of.put((name, references), (np.frombuffer(content) + 1.0).tobytes())
                 of.moved.step(end, end + h)
             self._put_back(here)
-            of.moved.restore(here.motion)
         apart = np.abs(ends[1] - ends[0]) - _SAME * of.tolerance * np.maximum(np.abs(ends[0]), 1.0)
         if (apart > 0.0).any():
             names = [*(of.moved.state_name(i) for i in range(len(here.states))), *map(repr, self._outputs.values())]

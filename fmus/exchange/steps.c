@@ -35,6 +35,7 @@ typedef struct {
     double *seed, *(*columns)(void *matrix); /* `seed`: zeros, as many as the largest array has elements */
     double *nominals, *scratch; /* magnitudes of the states; room for states and derivatives */
     int64_t unknown_count, differing; /* number of the derivative whose slope is not what a difference gives, from 1 */
+    int64_t noted; /* whether there is anything to be said of warnings, refusals and slopes */
     int64_t warnings[FUNCTIONS];
 } Exchange;
 
@@ -49,6 +50,7 @@ typedef int (*Completed3)(void *, bool, bool *, bool *);
 /* Whether the FMU did what it was asked for. */
 static bool done(Exchange *e, int64_t place, int status) {
     e->warnings[place] += status == WARNING;
+    e->noted |= status >= WARNING;
     if (status <= WARNING)
         return true;
     e->status = status;
@@ -146,6 +148,7 @@ EXPORT int exchange_jacobian(double t, void *x, void *fx, void *matrix, void *da
         e->seed[e->places[j]] = 0.0;
     }
     e->differing = fine ? differing(e, t, e->array(x), e->array(fx), all) : 0;
+    e->noted |= e->differing > 0;
     return e->differing > 0 ? -1 : said(e, fine && e->differing == 0);
 }
 

@@ -1,8 +1,8 @@
 """Benchmark: what a step of a model exchange FMU costs as a component, against fmpy's own simulation of it.
 
 Sections: ``steps`` (a communication step of 10 ms of the locomotive, FMI 2 and 3, inputs held and inputs that jump at
-every step, against fmpy's CVode and the same FMU's co-simulation), ``beside`` (a run with an observer, by each
-stepper).
+every step, against fmpy's CVode under the same inputs and the same FMU's co-simulation), ``beside`` (a run with an
+observer, by each stepper).
 
 Run it with ``python tests/benchmarks/exchange.py [SECTION ...]``; without a section, all of them. Nothing is asserted.
 A further section is a function in `SECTIONS` that prints.
@@ -17,6 +17,7 @@ from time import process_time
 from typing import Literal
 
 import fmpy
+import numpy as np
 from cpu_time import run_sections
 
 from cosim import Scenario
@@ -51,11 +52,20 @@ def stepped(path: Path, interface: Interface, *, jumps: bool) -> float:
     return spent / COUNT
 
 
-def simulated(path: Path) -> float:
-    """The same by fmpy's CVode, the input held [s]."""
+def simulated(path: Path, *, jumps: bool) -> float:
+    """The same by fmpy's CVode [s]."""
+    given = np.zeros(2 * COUNT, dtype=[("time", float), ("effort", float)])  # two rows at an instant: it jumps there
+    instants, efforts = STEP * np.arange(COUNT + 1), 50e3 + np.arange(1, COUNT + 1)
+    given["time"][::2], given["time"][1::2] = instants[:-1], instants[1:]
+    given["effort"][::2] = given["effort"][1::2] = efforts
+    folder = fmpy.extract(str(path))
     begin = process_time()
     fmpy.simulate_fmu(
-        str(path),
+        folder,
+        model_description=fmpy.read_model_description(folder),
+        input=given if jumps else None,
+        output=["position"],
+        record_events=False,
         fmi_type="ModelExchange",
         solver="CVode",
         relative_tolerance=TOLERANCE,
@@ -72,12 +82,17 @@ def steps() -> None:
         versions: tuple[Literal[2, 3], ...] = (2, 3)
         for version in versions:
             path = build_fmu(Locomotive(), Path(folder) / f"locomotive{version}.fmu", fmi_version=version)
-            reference = simulated(path)
-            print(f"FMI {version}: fmpy {1e6 * reference:.0f} us a step")
+            references = {jumps: simulated(path, jumps=jumps) for jumps in (False, True)}
+            for jumps, reference in references.items():
+                print(f"FMI {version}: fmpy, inputs {_word(jumps)}: {1e6 * reference:.0f} us a step")
             for interface, jumps in (("model-exchange", False), ("model-exchange", True), ("co-simulation", True)):
                 spent = stepped(path, interface, jumps=jumps)  # type: ignore[arg-type]
-                inputs = "jump at each step" if jumps else "held"
-                print(f"  {interface}, inputs {inputs}: {1e6 * spent:.0f} us, {spent / reference:.2f} of fmpy")
+                share = f"{spent / references[jumps]:.2f} of fmpy"
+                print(f"  {interface}, inputs {_word(jumps)}: {1e6 * spent:.0f} us, {share}")
+
+
+def _word(jumps: bool) -> str:
+    return "jump at each step" if jumps else "held"
 
 
 def beside() -> None:

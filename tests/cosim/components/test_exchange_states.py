@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -104,6 +105,58 @@ def test_nothing_leads_back_before_an_event(folder: Path, made: list[Stepped], v
     fmu.component.restore(after)
     fmu.time = 1.0
     assert fmu.to(1.2).tolist() == end
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_one_that_is_strict_about_its_modes_is_put_back_as_it_puts_itself(tmp_path: Path, version: int) -> None:
+    """The pendulum saves its states; the same FMU that does not say so goes on with the same bits."""
+    rows = []
+    for saves in (True, False):
+        component = load_fmu(pendulum(tmp_path, version, saves), "pendulum", 1e-8, interface="model-exchange")
+        component.instantiate()
+        component.set_start("pendulum_angle", 0.3)
+        component.enter_initialization(0.0, 10.0)
+        values, names = np.zeros(1), component.names("input")
+        write, inputs = component.writer(names)
+        write()
+        component.exit_initialization()
+        read = component.reader(["angle"], values)
+        seen = []
+        state = component.save()
+        for t in (0.0, 0.1, 0.2, 0.3):
+            inputs[:] = 1.0 + t
+            write()
+            component.advance(t, t + 0.1)
+            if t == 0.1:
+                state = component.save()
+        component.restore(state)
+        for t in (0.2, 0.3):
+            inputs[:] = 2.0 + t
+            write()
+            component.advance(t, t + 0.1)
+            read()
+            seen.append(values.tolist())
+        rows.append(seen)
+        component.terminate()
+        component.free()
+    assert rows[0] == rows[1]
+
+
+def pendulum(folder: Path, version: int, saves: bool) -> Path:
+    """Ours, which says that its states are saved, or that they are not."""
+    whole = fmus.cached_fmu(PLANTS["pendulum"](), fmi_version=version)  # type: ignore[arg-type]
+    path, word = (
+        folder / f"pendulum{saves}.fmu",
+        b'canGetAndSetFMUstate="' if version == 2 else b'canGetAndSetFMUState="',
+    )
+    with zipfile.ZipFile(whole) as source, zipfile.ZipFile(path, "w") as target:
+        for entry in source.namelist():
+            content = source.read(entry)
+            if entry == "modelDescription.xml" and not saves:
+                assert word + b"true" in content
+                content = content.replace(word + b"true", word + b"false")
+            target.writestr(entry, content)
+    return path
 
 
 @pytest.mark.parametrize("version", VERSIONS)
