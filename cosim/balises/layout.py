@@ -16,6 +16,7 @@ import numpy as np
 
 from cosim.errors import ScenarioError
 from cosim.results.record_rows import require_accuracy
+from plant_models.repeated_names import repeated_names
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +57,9 @@ class TrackLayout:
         object.__setattr__(self, "positions", positions)
 
     def _check_balises(self) -> None:
-        names = [b.identity for b in self.balises]
-        repeated = sorted({name for name in names if names.count(name) > 1}) if len(set(names)) < len(names) else []
-        if repeated:
+        if twice := repeated_names(b.identity for b in self.balises):
             raise ScenarioError(
-                f"Every balise needs an identity of its own; used more than once: {', '.join(repeated[:5])}."
+                f"Every balise needs an identity of its own; used more than once: {', '.join(twice[:5])}."
             )
         for b in self.balises:
             if not 0.0 <= b.location_accuracy < inf:

@@ -32,6 +32,8 @@ REPEATED = "repeated"
 
 
 _TIME = attrgetter("time")
+_NO_MORE = FalseTelegram(np.inf, 0.0)
+"""Stands behind the last one."""
 _ANNOUNCED, _BACKLOG = attrgetter("announced"), attrgetter("backlog")
 
 
@@ -59,7 +61,8 @@ class BaliseService:
         self.passed = 0
         self._delivered: dict[tuple[str, float], None] = {}  # in the order of delivery
         self._by_name = {r.planned.component.name: r for r in receivers}
-        self._false = sorted(channel.false_telegrams, key=lambda f: f.time)
+        self._false = [*sorted(channel.false_telegrams, key=lambda f: f.time), _NO_MORE]
+        self._next_false = 0
         self._t = self._until = nan
         self._snapshots: list[Snapshot] = []
         self._ahead: list[Snapshot] = []
@@ -132,7 +135,7 @@ class BaliseService:
 
     @property
     def _something_to_deliver(self) -> bool:
-        return bool(self._snapshots or self.mailbox.waiting or self._false)
+        return bool(self._snapshots or self.mailbox.waiting or self._false[self._next_false] is not _NO_MORE)
 
     def rows(self) -> Sequence[Row]:
         """The step is done: log the telegrams delivered in it.
@@ -157,7 +160,7 @@ class BaliseService:
         if any(map(_ANNOUNCED, self.receivers)) or any(map(_BACKLOG, self.receivers)):
             return -np.inf
         first = self.mailbox.waiting[0].delivered_at if self.mailbox.waiting else np.inf
-        return min(first, self._false[0].time) if self._false else first
+        return min(first, self._false[self._next_false].time)
 
     # -- steps done by somebody else ---------------------------------------------------------------------------------
 
@@ -187,17 +190,16 @@ class BaliseService:
         mailbox = list(self.mailbox.waiting), len(self.mailbox.log)
         receivers = [r.save() for r in self.receivers]
         passed = self.passed, len(self._delivered)
-        return mailbox, passed, list(self._false), self.localiser.save(), receivers, list(self._ahead)
+        return mailbox, passed, self._next_false, self.localiser.save(), receivers, list(self._ahead)
 
     def restore(self, state: Any) -> None:
         """Return to a saved state."""
-        (waiting, logged), (self.passed, delivered), false, localiser, receivers, ahead = state
+        (waiting, logged), (self.passed, delivered), self._next_false, localiser, receivers, ahead = state
         while len(self._delivered) > delivered:
             self._delivered.popitem()
         self._ahead = list(ahead)
         self.mailbox.waiting = list(waiting)
         del self.mailbox.log[logged:]
-        self._false = list(false)
         self.localiser.restore(localiser)
         for receiver, saved in zip(self.receivers, receivers, strict=True):
             receiver.restore(saved)
@@ -234,8 +236,9 @@ class BaliseService:
         for crossing, _ in self._snapshots:
             self.mailbox.post(self.channel.transmit(crossing, self.passed, self._odometer_at(crossing.stamp, t, until)))
             self.passed += 1
-        while self._false and self._false[0].time <= until + TIME_TOLERANCE:
-            self.mailbox.post(self._false_telegram(self._false.pop(0), t, until))
+        while self._false[self._next_false].time <= until + TIME_TOLERANCE:
+            self.mailbox.post(self._false_telegram(self._false[self._next_false], t, until))
+            self._next_false += 1
         return [e for e in self.mailbox.due(until + TIME_TOLERANCE) if not self._is_repeated(e)]
 
     def _is_repeated(self, telegram: BaliseRecord) -> bool:

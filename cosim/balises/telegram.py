@@ -6,7 +6,7 @@ missed, some telegrams are false. All chance comes from (seed, number of the cro
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_right, insort
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, nan
@@ -119,8 +119,7 @@ class Mailbox(Generic[T]):
         if telegram.kind in ("missed", "lost"):
             self.log.append(telegram)
             return
-        self.waiting.append(telegram)
-        self.waiting.sort(key=_delivery)
+        insort(self.waiting, telegram, key=_delivery)
 
     def due(self, until: float) -> list[T]:
         """Take out what is delivered at or before `until` [s]."""

@@ -194,7 +194,8 @@ def compare_results(
         check_time(side.time, label)
     ours, theirs = _names(reference), _names(result)
     _check_common(reference, result, tolerances, labels)
-    extra = [name for name in theirs if name not in set(ours)]
+    known = set(ours)
+    extra = [name for name in theirs if name not in known]
     pair = _Pair(reference, result, tolerances, curves, extra)
     with np.errstate(over="ignore", invalid="ignore"):  # infinities, and numbers so large that their differences are
         signals = [pair.compare(name) for name in ours] + [pair.lone(name, "extra") for name in extra]
@@ -256,7 +257,8 @@ def _names(side: Result) -> list[str]:
 
 def _check_common(reference: Result, result: Result, tolerances: Tolerances, labels: tuple[str, str]) -> None:
     ours, theirs = _names(reference), _names(result)
-    common = [name for name in ours if name in set(theirs)]
+    known = set(theirs)
+    common = [name for name in ours if name in known]
     if not common:
         near = _nearest(ours[0], theirs) if ours else []
         hint = f" {labels[0]} has {ours[0]!r}, nearest in {labels[1]}: {', '.join(map(repr, near))}." if near else ""

@@ -107,7 +107,9 @@ def _match(
     one, two = _groups(reference), _groups(result)
     for key in {**one, **two}:
         found, left, right = _assign(one.get(key, []), two.get(key, []))
-        pairs, missing, extra = pairs + found, missing + left, extra + right
+        pairs += found
+        missing += left
+        extra += right
     found, missing, extra = _assign(missing, extra)
     for pair in found:
         if abs(pair[0].stamp - pair[1].stamp) <= window:

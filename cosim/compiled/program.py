@@ -211,7 +211,7 @@ class Program:
         outputs = [s.name.removeprefix(f"{component.name}.") for s in self.plan.signals[step.columns]]
         made = CSlave(instance=instance, fmi_version=component.fmi_version)
         made.do_step = self.function(component, f"fmi{component.fmi_version}DoStep")
-        made.no_way_back, made.left_at = map(ctypes.addressof, (component.no_way_back, component.left_at))
+        made.no_way_back, made.left_at = ctypes.addressof(component.no_way_back), ctypes.addressof(component.left_at)
         made.numbers = LAST_CALL.numbers(component.name)
         made.returns_early = component.capabilities.mightReturnEarlyFromDoStep
         made.usual_step, made.rounding = component.usual_step, component.rounding

@@ -160,7 +160,7 @@ class ResultData(FirstScreen, Mapping[str, np.ndarray]):
         if not isinstance(key, str):
             example = names[1] if len(names) > 1 else "time"
             raise KeyError(f"{key!r} is no name of a signal; a name is wanted, and rows behind it: [{example!r}][0]")
-        if name not in names:
+        if name not in (self.table.dtype.fields or {}):
             raise KeyError(f"signal {name!r} was not recorded; {nearest(name, names)}")
         return np.asarray(self.table[name])
 

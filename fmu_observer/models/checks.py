@@ -12,6 +12,7 @@ from math import isfinite
 import numpy as np
 
 from plant_models.hybrid import Signal
+from plant_models.repeated_names import repeated_names
 
 _CAUSALITIES = {
     "states": ("local", "state"),
@@ -105,6 +106,5 @@ def check_numbers(where: str, positive: Mapping[str, float], not_negative: Mappi
 
 
 def _check_once(where: str, kind: str, names: Sequence[str]) -> None:
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise ValueError(f"{where}: used more than once among its {kind}: {', '.join(repeated)}.")
+    if twice := repeated_names(names):
+        raise ValueError(f"{where}: used more than once among its {kind}: {', '.join(twice)}.")

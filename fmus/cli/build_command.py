@@ -25,6 +25,7 @@ from fmus.recipes import RECIPES, SYSTEM, legal_values, recipe
 from fmus.toolchain.targets import choose_targets
 from plant_models import PLANTS
 from plant_models.hybrid.casadi_package import demand_casadi
+from plant_models.repeated_names import repeated_names
 from plant_models.user_file import load_class, make, names_a_file, names_code
 
 Version = Literal[2, 3]
@@ -160,9 +161,8 @@ def _jobs(options: argparse.Namespace) -> list[_BuildJob]:
     if several and options.output.suffix.lower() == ".fmu":
         raise ValueError(f"-o {options.output} is one file, but several FMUs were asked for; give a folder.")
     systems = [_system(name, options.option) for name in names]
-    repeated = sorted({s.name for s in systems if [t.name for t in systems].count(s.name) > 1})
-    if repeated:
-        raise ValueError(f"Several models have the name {', '.join(repeated)} and would overwrite each other.")
+    if twice := repeated_names(system.name for system in systems):
+        raise ValueError(f"Several models have the name {', '.join(twice)} and would overwrite each other.")
     folders = {
         version: options.output / f"fmi{version}" if len(versions) > 1 else options.output for version in versions
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from plant_models.hybrid.declarations import Declarations
+from plant_models.repeated_names import repeated_names
 
 RESERVED_NAMES = frozenset({"time", "internal_step", "seed", "late_policy", "replay_horizon", "held_switches"})
 
@@ -33,9 +34,9 @@ def _check_names(system: Declarations, where: str) -> None:
     names = [s.name for s in (*system.states, *system.input_signals, *system.outputs, *system.parameters)]
     names += [e.name for e in system.events]
     names += [name for e in system.triggered_events for name in e.implied_names]
-    repeated = sorted({n for n in names if names.count(n) > 1} | (RESERVED_NAMES & set(names)))
-    if repeated:
-        raise ValueError(f"{where}: names used twice or reserved: {', '.join(repeated)}.")
+    refused = sorted({*repeated_names(names)} | (RESERVED_NAMES & set(names)))
+    if refused:
+        raise ValueError(f"{where}: names used twice or reserved: {', '.join(refused)}.")
 
 
 def _check_order_of_states(system: Declarations, where: str) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from cosim.errors import ComparisonError
 from cosim.evaluation.spec import Phase, ReportSpec
 from cosim.results.result import Result
+from plant_models.repeated_names import repeated_names
 
 MOST_RUNS = 12  # that anybody can distinguish in a figure
 
@@ -44,8 +45,7 @@ def make_runs(results: Sequence[Result], specs: Sequence[ReportSpec], labels: Se
         raise ComparisonError(
             f"At most {MOST_RUNS} runs can be distinguished in a figure (got {len(results)}): choose some."
         )
-    twice = sorted({label for label in labels if list(labels).count(label) > 1})
-    if twice:
+    if twice := repeated_names(labels):
         raise ComparisonError(f"Two runs have the label {twice[0]!r}: give each its own, for instance with --labels.")
     for label, result in zip(labels, results, strict=True):
         if not len(result.time):

@@ -62,7 +62,8 @@ def _parameters(summary: Mapping[str, Any], taken: Iterable[str]) -> dict[str, f
         for name, value in (component.get("parameters") or {}).items():
             if isinstance(value, (bool, int, float)) and not math.isnan(value):  # OpenModelica takes NaN for a change
                 found[f"{component['name']}.{name}"] = float(value)
-    return {name: value for name, value in found.items() if name not in set(taken)}
+    known = set(taken)
+    return {name: value for name, value in found.items() if name not in known}
 
 
 def _ends(table: np.ndarray) -> list[float]:

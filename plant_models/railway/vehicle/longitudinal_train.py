@@ -45,7 +45,7 @@ class _LongitudinalForces(HybridSystem):
         input_signal("effort_loss", "1", 0.0, "Share of the effort that is lost, 0 to 1", optional=True),
         input_signal("disturbance_force", "N", 0.0, "Unknown force along increasing position", optional=True),
     )
-    outputs = (
+    outputs: tuple[Signal, ...] = (
         *POINT_OUTPUTS,
         output_signal("wheel_speed", "m/s", "Circumferential speed of a wheel that rolls", display_unit="km/h"),
         output_signal("resistance_force", "N", "Davis resistance, against the motion"),
