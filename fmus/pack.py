@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from plant_models.disk_cache.entries import whole_file
+from plant_models.left_behind import owned
 
 _TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 """Of every file in an FMU: the earliest a zip file can hold."""
@@ -35,7 +36,7 @@ def check_target(target: Path) -> None:
     while not folder.exists() and folder != folder.parent:
         folder = folder.parent
     try:
-        handle, name = tempfile.mkstemp(prefix=".fmus-", dir=folder)
+        handle, name = tempfile.mkstemp(prefix=owned(".fmus-", folder), dir=folder)
     except OSError as error:
         raise type(error)(
             f"{target} cannot be written: {folder}: {error.strerror or error}; choose another folder."

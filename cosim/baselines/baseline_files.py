@@ -27,6 +27,7 @@ from cosim.results.result import BaliseRecord, Result
 from cosim.results.table_layout import table_dtype
 from fmus.near_files import what_it_is
 from fmus.tables.plain_data import jsonable
+from plant_models.left_behind import owned
 
 Change = Literal["new", "changed", "unchanged"]
 MARKERS = ("<<<<<<< ", "=======", ">>>>>>> ")
@@ -206,7 +207,7 @@ def write_texts(texts: dict[str, str], path: Path) -> None:
     _demand_free(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".writing-") as scratch:
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=owned(".writing-", path.parent)) as scratch:
             for kind in ("table", "events", "header"):
                 (Path(scratch) / kind).write_text(texts[kind], encoding="utf-8", newline="\n")
             for kind in ("table", "events", "header"):

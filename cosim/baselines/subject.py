@@ -20,6 +20,7 @@ from cosim.results.result import Result
 from cosim.run.outcome import Outcome
 from cosim.scenario.fmu_alone import FmuAlone
 from cosim.simulation.scenario import Scenario
+from plant_models.left_behind import owned
 
 LOG = logging.getLogger("cosim")
 Progress = Callable[[float, float], None]
@@ -81,7 +82,7 @@ def run_again(
     if stimuli is None or recipe.inputs:
         with after_its_delivery(baseline.path, recipe.source):
             return _run_recipe(recipe, progress)
-    with TemporaryDirectory(prefix="fmu-reference-") as folder:
+    with TemporaryDirectory(prefix=owned("fmu-reference-")) as folder:
         table = Path(folder) / "inputs.csv"
         table.write_bytes(stimuli)
         return _run_recipe(replace(recipe, inputs=str(table)), progress)

@@ -22,6 +22,7 @@ from fmus.fmi.archive import MAX_UNPACKED_BYTES, Archive, open_archive
 from fmus.fmi.standard import fmi_version
 from plant_models.code_trust import WHY_NOT, is_looking, remember
 from plant_models.disk_cache.files import file_digest
+from plant_models.left_behind import owned
 
 VERSIONS = ("1.0", "2.0", "3.0")
 KEPT = 16
@@ -91,7 +92,7 @@ def unpack(archive: Archive) -> Path:
     digest = _digest(archive.path)
     remember([archive.path])
     content = None if digest is None else _contents.get(digest)
-    folder = Path(mkdtemp(prefix="fmu_"))
+    folder = Path(mkdtemp(prefix=owned("fmu_")))
     try:
         if content is None:
             _extract(archive, folder)
@@ -113,7 +114,7 @@ def _copy(archive: Archive, content: _Content, folder: Path) -> None:
         else:
             return
     _extract(archive, folder)
-    content.folder = Path(shutil.copytree(folder, Path(mkdtemp(prefix="fmu_content_")), dirs_exist_ok=True))
+    content.folder = Path(shutil.copytree(folder, Path(mkdtemp(prefix=owned("fmu_content_"))), dirs_exist_ok=True))
 
 
 def _extract(archive: Archive, folder: Path) -> None:

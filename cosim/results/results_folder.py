@@ -23,6 +23,7 @@ from cosim.results.formats.known_formats import FORMATS, check_formats, fastest_
 from cosim.results.record_rows import PACKET_ROWS, TELEGRAM_ROWS, Record, RecordRows
 from cosim.results.result_data import ResultData, SignalInfo
 from cosim.results.summary_file import read_summary, write_summary
+from plant_models.left_behind import owned
 from plant_models.missing_package import is_installed
 
 EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
@@ -131,7 +132,7 @@ def write_results(result: ResultData, directory: str | Path, formats: Sequence[s
     check_formats(formats)
     folder = check_writable(directory)
     try:
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=owned(".writing-", folder)) as scratch:
             for name in _write_all(result, Path(scratch), formats):
                 (Path(scratch) / name).replace(folder / name)
         for stale in set(table_files()) - set(formats):
@@ -159,11 +160,16 @@ def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapp
     content = read_summary(folder / SUMMARY)
     if content.get("layout") != LAYOUT:
         raise ValueError(f"{SUMMARY} has layout {content.get('layout')!r}, this version reads layout {LAYOUT}.")
+    if not isinstance(content["summary"], dict):
+        raise ValueError(f"{SUMMARY}: summary is no table; another program wrote it, or it was edited.")
     signals = [SignalInfo(**signal) for signal in content["signals"]]
     if not content.get("ended", True):  # it was streamed here, and its program died
         rows, events, logged, sent = (folder / name for name in (usual_file("npy"), EVENTS, MESSAGES, PACKETS))
         return _read_unfinished(rows, events, logged, sent, content), content
     table = _table(folder, table_name)
+    lost = [signal.name for signal in signals if signal.name not in (table.dtype.names or ())]
+    if lost:
+        raise ValueError(f"{SUMMARY} speaks of signal {lost[0]!r}, which the table does not have.")
     messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
     packets = PACKET_ROWS.read(folder / PACKETS) if (folder / PACKETS).exists() else []
     return ResultData(table, signals, TELEGRAM_ROWS.read(folder / EVENTS), messages=messages, packets=packets), content

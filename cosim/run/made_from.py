@@ -24,6 +24,7 @@ from cosim.scenario.toml_values import plain
 from fmus.tables.plain_data import jsonable
 from fmus.versions import versions
 from plant_models.hybrid.noise import RUN_SEED
+from plant_models.left_behind import owned
 from plant_models.user_file import names_code
 
 _FILES_UP_TO = 50e6
@@ -57,7 +58,7 @@ def renewed(directory: str | Path, origin: Origin | None, files_up_to: float = _
         what = f"its {MADE_FROM} is not that of a run"
         raise OutputError(f"Results cannot be written to {folder}: {what}. Choose another output folder.")
     try:
-        with tempfile.TemporaryDirectory(dir=folder, prefix=f".{MADE_FROM}-") as scratch:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=owned(f".{MADE_FROM}-", folder)) as scratch:
             new, former = Path(scratch) / "new", Path(scratch) / "former"
             manifest = None if origin is None else _prepare(origin, new, files_up_to)
             if place.exists():

@@ -27,6 +27,7 @@ from cosim.errors import RunError
 from cosim.process.call_clock import CallClock
 from cosim.process.last_call import make_page
 from cosim.runs.job import Ended, Failure, Job, pickled
+from plant_models.left_behind import owned
 
 _STOP_SECONDS = 5.0
 _POLL = 0.1
@@ -134,7 +135,7 @@ class _Worker:
             raise RunError("A script whose own classes run in worker processes needs: if __name__ == '__main__':")
         self.script, self.dead = script, False
         self.pipe, theirs = Pipe()
-        self._folder = TemporaryDirectory(prefix="worker-")
+        self._folder = TemporaryDirectory(prefix=owned("worker-"))
         page = Path(self._folder.name) / "last_call"
         self._last = make_page(page)
         self._clock, self._why = CallClock(self._last), ""

@@ -22,6 +22,7 @@ from cosim.ssp.document import Node, fail
 from cosim.ssp.lapses import Lapses
 from fmus.fmi.archive import MAX_UNPACKED_BYTES, NotAnFmuError, demand_harmless
 from fmus.near_files import missing_file
+from plant_models.left_behind import owned
 
 DEFAULT_VARIANT = "SystemStructure.ssd"
 _MAX_XML_BYTES = 64 * 1024**2
@@ -31,7 +32,7 @@ class Unpacked:
     """A folder for what is unpacked, removed with the last object that holds this one."""
 
     def __init__(self) -> None:
-        self.path = Path(mkdtemp(prefix="ssp-"))
+        self.path = Path(mkdtemp(prefix=owned("ssp-")))
         self.remove = weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
     def fresh(self, name: str) -> Path:
@@ -144,5 +145,7 @@ class Package:
         try:
             with zipfile.ZipFile(self.path) as archive, archive.open(name) as stream:
                 yield stream
-        except (zipfile.BadZipFile, OSError, EOFError, ValueError, RuntimeError, NotImplementedError) as error:
+        except ScenarioError:
+            raise
+        except Exception as error:  # each compression throws its own: zlib.error, lzma.LZMAError
             raise ScenarioError(f"{self.title}: {name} is damaged: {error}") from error

@@ -22,6 +22,7 @@ from cosim.tuning.study import Study
 from cosim.tuning.tuning_files import write_tuning
 from cosim.tuning.tuning_result import Tuning
 from fmus.cli.progress import Progress, reported
+from plant_models.left_behind import owned
 
 
 def tune(
@@ -140,5 +141,5 @@ def _folder(directory: str | Path | None, resume: bool) -> Iterator[Path]:
     if directory is not None:
         yield check_writable(Path(directory)).absolute()
         return
-    with TemporaryDirectory(prefix="tuning-") as folder:
+    with TemporaryDirectory(prefix=owned("tuning-")) as folder:
         yield Path(folder)

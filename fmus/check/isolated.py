@@ -27,6 +27,7 @@ from fmus.check.findings import CheckFinding, Verdict
 from fmus.check.job import CheckJob
 from fmus.check.known_checks import CHECKS
 from fmus.check.worker import FILES_CLOSED, unrun
+from plant_models.left_behind import owned
 
 _START_LIMIT = 60.0
 """Time a child may take to start before its first check [s]; a loaded machine takes seconds."""
@@ -151,7 +152,7 @@ def _run_child(job: CheckJob, console: IO[bytes], progress: Callable[[str], None
 @contextmanager
 def _process(console: IO[bytes]) -> Iterator[subprocess.Popen[bytes]]:
     """A child in a folder and a session of its own; it and what it started are ended here."""
-    with TemporaryDirectory(prefix="fmus-check-", ignore_cleanup_errors=True) as folder:
+    with TemporaryDirectory(prefix=owned("fmus-check-"), ignore_cleanup_errors=True) as folder:
         paths = [str(_PACKAGE_ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
         process = subprocess.Popen(
             [sys.executable, "-P", "-m", "fmus.check.watchdog", str(PROCESSES), str(MEMORY)],

@@ -20,6 +20,7 @@ from fmus.fmi.sense import distinguish, nonsense
 from fmus.fmi.sources import add_compiled, build_configurations, compiled_here, how_to_compile
 from fmus.fmi.standard import INTERFACES
 from fmus.near_files import missing_file, what_it_is
+from plant_models.left_behind import owned
 
 MAX_UNPACKED_BYTES = 2 * 1024**3
 MAX_FILES = 100_000
@@ -123,7 +124,7 @@ class Archive:
         Raises:
             NotAnFmuError: the archive is corrupt.
         """
-        with TemporaryDirectory(prefix="fmus-check-", ignore_cleanup_errors=True) as name:
+        with TemporaryDirectory(prefix=owned("fmus-check-"), ignore_cleanup_errors=True) as name:
             try:
                 with zipfile.ZipFile(self.path) as archive:
                     archive.extractall(name)

@@ -29,6 +29,7 @@ from fmus.hosted.source import HostedExportError, Model, Source, find_source
 from fmus.pack import check_target, fmu_path, pack_fmu
 from fmus.toolchain.compile import compile_library, find_compiler, library_name
 from fmus.toolchain.platforms import Platform, host_platform
+from plant_models.left_behind import owned
 from plant_models.missing_package import installation
 
 __all__ = ["HostedExportError", "build_hosted_fmu"]
@@ -97,7 +98,7 @@ def build_hosted_fmu(
 
 def _tried(resources: Mapping[str, bytes], recipe: Mapping[str, Any], slave: str, digest: str) -> ModelDescription:
     """The description of a model that has run in a process of its own, from the files that go into the FMU."""
-    with tempfile.TemporaryDirectory(prefix="fmus-hosted-") as name:
+    with tempfile.TemporaryDirectory(prefix=owned("fmus-hosted-")) as name:
         folder = Path(name)
         _write(resources, folder)
         description = _describe(recipe, folder, digest)
@@ -162,7 +163,7 @@ def _front(description: ModelDescription) -> dict[str, bytes]:
         "HOSTED_OLDEST_MINOR": str(_OLDEST_PYTHON[1]),
     }
     name = library_name(identifier)
-    with tempfile.TemporaryDirectory(prefix="fmus-hosted-") as place:
+    with tempfile.TemporaryDirectory(prefix=owned("fmus-hosted-")) as place:
         folder = Path(place)
         _write({entry.name: entry.read_bytes() for entry in (files("fmus.hosted") / "front").iterdir()}, folder)
         (folder / "hosted_model.h").write_text("".join(f"#define {key} {value}\n" for key, value in header.items()))

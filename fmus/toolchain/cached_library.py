@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fmus.toolchain.compile import Compiler, compile_library, compile_program, library_name
 from plant_models.disk_cache.files import is_sealed, seal
+from plant_models.left_behind import owned
 
 
 def cached_library(name: str, sources: Mapping[str, bytes], main: str, compiler: Compiler, folder: Path) -> Path:
@@ -59,7 +60,7 @@ def _cached(
     target = folder / f"{name}-{digest}" / file_name
     if not is_sealed(target):  # to load a part of a library can end the process
         target.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix="build-", dir=target.parent) as scratch:
+        with tempfile.TemporaryDirectory(prefix=owned("build-", target.parent), dir=target.parent) as scratch:
             for file, text in sources.items():
                 (Path(scratch) / file).write_bytes(text)
             build(compiler, Path(scratch), [main], target.name).replace(target)

@@ -18,6 +18,7 @@ import fmpy
 
 from fmus.toolchain.platforms import Platform, host_platform
 from plant_models.disk_cache.folder import cache_folder
+from plant_models.left_behind import owned
 
 _CANDIDATES = ("cc", "gcc", "clang")
 
@@ -157,7 +158,7 @@ def run_compiler(compiler: Compiler, folder: Path, words: Sequence[str]) -> None
         CompilationError: it refused.
     """
     command = [*compiler.command, *words]
-    with tempfile.TemporaryDirectory(prefix="fmus-scratch-") as scratch:
+    with tempfile.TemporaryDirectory(prefix=owned("fmus-scratch-")) as scratch:
         environment = _zig_environment(Path(scratch)) if compiler.zig else None
         done = subprocess.run(
             command, cwd=folder, capture_output=True, text=True, errors="replace", check=False, env=environment

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fmus.toolchain.compile import Compiler, compile_library, cross_compiler, find_compiler
 from fmus.toolchain.platforms import HOST, PLATFORMS, Platform, host_platform, platform_names
+from plant_models.left_behind import owned
 
 Progress = Callable[[str], None]
 """Called with the name of each platform whose library is done."""
@@ -81,7 +82,7 @@ def compile_targets(
 
 
 def _library(target: Target, files: Mapping[str, bytes], sources: Sequence[str], identifier: str) -> bytes:
-    with tempfile.TemporaryDirectory(prefix="fmus-") as name:
+    with tempfile.TemporaryDirectory(prefix=owned("fmus-")) as name:
         folder = Path(name)
         for source, text in files.items():
             (folder / source).write_bytes(text)

@@ -40,6 +40,7 @@ from cosim.scenario.fmu_alone import run_times
 from cosim.ssp.annotation import read_parameter_set
 from cosim.ssp.document import parse
 from cosim.ssp.lapses import Lapses
+from plant_models.left_behind import owned
 
 COMPONENT = "fmu"
 """What the component of an FMU alone is called, see `Scenario.fmu`."""
@@ -153,7 +154,7 @@ def _baseline(reference: Reference) -> Baseline:
 
 
 def _load(text: bytes, where: str) -> Result:
-    with tempfile.TemporaryDirectory(prefix="fmu-reference-") as folder:
+    with tempfile.TemporaryDirectory(prefix=owned("fmu-reference-")) as folder:
         file = Path(folder) / "reference.csv"
         file.write_bytes(text)
         try:

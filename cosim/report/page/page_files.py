@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cosim.errors import OutputError
+from plant_models.left_behind import owned
 
 
 @contextmanager
@@ -81,7 +82,7 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
         OSError: one cannot be written; former ones are still whole.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as scratch:
+    with tempfile.TemporaryDirectory(dir=folder, prefix=owned(".writing-", folder)) as scratch:
         for name, data in contents.items():
             (Path(scratch) / name).write_bytes(data)
         for name in contents:
