@@ -142,6 +142,10 @@ class InstantLayout:
 Layout = TrackLayout | InstantLayout
 
 
+MOST_BALISES = 1e6
+"""Of a layout by spacing: every metre of a thousand kilometres; more takes gigabytes, and looks like a hang."""
+
+
 def by_spacing(spacing: float, first: float, last: float, location_accuracy: float = 0.0) -> TrackLayout:
     """Balises every `spacing` metres from `first` to `last` [m].
 
@@ -149,11 +153,17 @@ def by_spacing(spacing: float, first: float, last: float, location_accuracy: flo
         location_accuracy: Q_LOCACC [m].
 
     Raises:
-        ScenarioError: the spacing is not positive, or there is no balise.
+        ScenarioError: the spacing is not positive, or there is no balise, or more than `MOST_BALISES`.
     """
     if not spacing > 0.0:
         raise ScenarioError(f"Balise spacing must be positive, got {spacing!r} m.")
-    count = int(np.floor((last - first) / spacing + 1e-9)) + 1
+    intervals = (last - first) / spacing + 1e-9
+    if not intervals < MOST_BALISES:
+        raise ScenarioError(
+            f"Balises every {spacing:g} m from {first:g} m to {last:g} m are more than {MOST_BALISES:.0e}; a track_end "
+            "beyond the reach of the train is of no use."
+        )
+    count = int(np.floor(intervals)) + 1
     if count < 1:
         raise ScenarioError(f"No balise between {first:g} m and {last:g} m.")
     return TrackLayout(tuple(Balise(f"B{i + 1}", first + i * spacing, location_accuracy) for i in range(count)))

@@ -118,7 +118,7 @@ def _header(data: Mapping[str, Any], folder: Path, version: str) -> Header:
         components=[_component(entry) for entry in data["components"]],
         signals=[_known(SignalInfo, entry) for entry in data["signals"]],
         tolerances=_tolerances_from(data["tolerances"]),
-        selection=data.get("selection"),
+        selection=None if data.get("selection") is None else [str(pattern) for pattern in data["selection"]],
         every=data.get("every"),
         rows=int(data["rows"]),
         events=data.get("events"),

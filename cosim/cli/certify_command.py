@@ -17,9 +17,10 @@ from cosim.errors import CosimError
 from cosim.run.component_models import make_declared, stated_parameters
 from cosim.run.run_seeds import with_seeds
 from cosim.run.task import RunTask
+from cosim.scenario.includes import read_tables
 from cosim.scenario.scenario_tables import ComponentTable
+from cosim.scenario.schema import parse_part
 from cosim.scenario.shipped import shipped_scenarios
-from cosim.scenario.toml_file import read_toml
 from fmus.cli.commands import argument, repeated
 from fmus.cli.output import Output
 from fmus.tables.table import Parts
@@ -118,8 +119,11 @@ def _gains_file(what: str) -> ComponentTable | None:
     path = Path(what)
     if path.suffix.lower() != ".toml" or not path.is_file():
         return None
-    data = read_toml(path)
-    return ComponentTable.model_validate(data) if "observer" in data else None
+    data = read_tables(path).data
+    if "observer" not in data:
+        return None
+    table: ComponentTable = parse_part({"components": {"gains": data}}, what).components["gains"]
+    return table
 
 
 def _of_gains(table: ComponentTable, options: argparse.Namespace, demands: Demands) -> Certified:

@@ -4,6 +4,7 @@ files.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -104,7 +105,8 @@ def read_tables(path: Path, chain: Sequence[Path] = ()) -> Tables:
         removed that
             is not there, or an override has no target.
     """
-    if path.resolve() in [file.resolve() for file in chain]:
+    # a path that is a circle of links has no other name, and `resolve` raises
+    if os.path.realpath(path) in [os.path.realpath(file) for file in chain]:
         raise ScenarioError(f"Scenario files include one another in a circle: {' -> '.join(map(str, (*chain, path)))}.")
     data = _read(path, chain)
     included, overrides = _listed(data.pop("include", []), path), data.pop("overrides", {})

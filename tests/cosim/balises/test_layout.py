@@ -159,3 +159,11 @@ def test_aperiodic_may_begin_anywhere_and_has_drop_outs() -> None:
     for low, high in ((0.0, 0.5), (0.5, 0.1)):
         with pytest.raises(ScenarioError, match="0 < min_gap <= max_gap"):
             aperiodic(1.0, 0, min_gap=low, max_gap=high)
+
+
+@pytest.mark.parametrize("last", [5.0e6, 1e20, 1e308, float("inf")])
+def test_more_balises_than_a_line_has_are_refused_at_once(last: float) -> None:
+    """1e20 / 5 balises would fill the memory."""
+    with pytest.raises(ScenarioError, match=r"Balises every 5 m .* are more than 1e\+06"):
+        by_spacing(5.0, 0.0, last)
+    assert len(by_spacing(5.0, 0.0, 4990.0).positions) == 999
