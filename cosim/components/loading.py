@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,6 +24,7 @@ from cosim.components.fmi3 import FMI3Component
 from cosim.components.stated_units import NONE_STATED, StatedUnit, state_units
 from cosim.components.unpacking import unpack
 from cosim.errors import CouplingError, FmuLoadError, ScenarioError
+from cosim.process.crashes import note_crash
 from cosim.process.exit_guard import guard_exit
 from cosim.process.last_call import LAST_CALL
 from fmu_observer.description import describe
@@ -38,6 +40,7 @@ from fmus.fmi.standard import CO_SIMULATION, Interface, Method, fmi_version
 from fmus.fmi.surroundings import Surroundings
 from fmus.isolation.library import load_isolated
 from fmus.isolation.limits import OwnProcess
+from plant_models.disk_cache.files import file_digest
 from plant_models.hybrid import HybridSystem, TracingError
 
 _LINK_MAP = 2  # dlinfo: RTLD_DI_LINKMAP
@@ -238,6 +241,7 @@ def load_fmu(
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
     guard_exit()
+    LAST_CALL.state_content(name, file_digest(path))
     folder, slave, changed = _loaded_in_peace(archive, path, name, kind, isolation)
     more = {"negated": negated_aliases(folder)} if fmi_version(description) == 1 else {}
     component: Component = COMPONENTS[fmi_version(description)](
@@ -246,7 +250,7 @@ def load_fmu(
         description,
         source=str(path),
         kind="FMU",
-        release_files=lambda: shutil.rmtree(folder, ignore_errors=True),
+        release_files=partial(_put_away, folder, path, slave),
         **more,
     )
     component.trespasses |= dict.fromkeys(changed, "loading its library")
@@ -254,6 +258,14 @@ def load_fmu(
     if kind != CO_SIMULATION:  # the solver is here, for FMI 1 too, and needs one
         component.tolerance = component.tolerance or (tolerance if isinstance(tolerance, float) else TOLERANCE)
     return component
+
+
+def _put_away(folder: Path, path: Path, slave: Any) -> None:
+    """Remove what was unpacked; an FMU that ended its own process is remembered."""
+    shutil.rmtree(folder, ignore_errors=True)
+    if getattr(slave, "apart", False) and slave.dll.reason:
+        with suppress(OSError):
+            note_crash(file_digest(path), slave.dll.reason)
 
 
 def _loaded_in_peace(

@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 
 from cosim.process.call_clock import CallClock
+from cosim.process.crashes import remember_crash
 from cosim.process.last_call import LAST_CALL
 
 ERROR = 2
@@ -97,6 +98,7 @@ def _give_up(what: str) -> None:
     test = os.environ.get("PYTEST_CURRENT_TEST", "")
     reason = f"{LAST_CALL.words()} {what}" + (f", in the test {test}" if test else "")
     LAST_CALL.note(reason)
+    remember_crash(LAST_CALL, what)
     with suppress(OSError):
         os.write(_output[0], f"\ncosim: {reason}.\n".encode(errors="replace"))
     os._exit(ERROR)

@@ -21,6 +21,7 @@ NOTE = PAGE // 2
 LONGEST = 80
 RUNNING = 0
 WRITE, READ, STEP, EVENT = range(4)
+_CONTENT = "content "
 _OFTEN = ("setting inputs", "getting outputs", "doStep", "an event")
 """What a component is called for in every step: their numbers follow one another."""
 
@@ -128,6 +129,16 @@ class LastCall:
         """
         self._limit[0] = seconds or 0.0
 
+    def state_content(self, component: str, digest: str) -> None:
+        """Say which file the code of a component is, for who finds this process gone.
+
+        Args:
+            component: its name. digest: of the file's content.
+        """
+        key = component, _CONTENT + digest
+        if key not in self._numbers:
+            self._numbers[key] = self._add(*key)
+
     def _four(self, component: str) -> int:
         """Four numbers, one after the other; 0 where there is no room for all of them."""
         first, *_, last = [self._add(component, what) for what in _OFTEN]
@@ -181,10 +192,22 @@ class LastCall:
         """
         return int(self.call[0]), bytes(self.memory[8:16])
 
+    @property
+    def content(self) -> str:
+        """Digest of the file whose code the present call is in; empty where that is not known."""
+        lines = self._lines()
+        number = int(self.call[0])
+        component = lines[number - 1].partition("\0")[0] if 0 < number <= len(lines) else None
+        stated = [what for name, _, what in (line.partition("\0") for line in lines) if name == component]
+        return next((what.removeprefix(_CONTENT) for what in reversed(stated) if what.startswith(_CONTENT)), "")
+
+    def _lines(self) -> list[str]:
+        return self.memory[TEXTS : TEXTS + self._cells[USED]].decode("utf-8", "replace").split("\n")[:-1]
+
     def words(self) -> str:
         """The present call, e.g. ``component 'train' in doStep at t = 3.2 s``; empty where there is none."""
         number, time = int(self.call[0]), float(self.time[0])
-        lines = self.memory[TEXTS : TEXTS + self._cells[USED]].decode("utf-8", "replace").split("\n")[:-1]
+        lines = self._lines()
         if not 0 < number <= len(lines):
             return ""
         component, _, what = lines[number - 1].partition("\0")

@@ -18,6 +18,7 @@ from time import monotonic
 from typing import Any
 
 from cosim.process.call_clock import CallClock
+from cosim.process.crashes import remember_crash
 from cosim.process.interruption import STOPPING
 from cosim.process.last_call import LAST_CALL
 
@@ -34,6 +35,8 @@ _WHO_CLOSED = (
     "an FMU closed files that this program had open: its standard streams, or its results. 'fmus check' finds which FMU"
 )
 
+_FROM_OUTSIDE = (-signal.SIGTERM, -signal.SIGINT, -9)
+"""Ends of a process that are no deed of an FMU: SIGTERM, SIGINT, SIGKILL."""
 _PARENT_DEATH = 1  # prctl: PR_SET_PDEATHSIG
 
 
@@ -132,7 +135,10 @@ class _Watch:
     def _reason(self, status: int) -> str:
         """Why a process ended that did not come to its end as it should."""
         where = LAST_CALL.words()
-        what = self._why or _how_it_ended(os.waitstatus_to_exitcode(status))
+        code = os.waitstatus_to_exitcode(status)
+        what = self._why or _how_it_ended(code)
+        if self._asked is None and (self._why or code not in _FROM_OUTSIDE):
+            remember_crash(LAST_CALL, what)
         return f"{where} {what}" if where else f"the program {what}, in no call of an FMU"
 
     def _status(self) -> int:

@@ -19,6 +19,7 @@ from cosim.components.python_model import PythonModel
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
+from cosim.process.crashes import noted_crash
 from cosim.run.backends import FAULTS, Notify, Realised, Request, cannot_build, realise
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.paths import absolute, move_option_files
@@ -26,6 +27,8 @@ from cosim.scenario.scenario_tables import Backend, ComponentTable, Isolate
 from fmu_observer.event_protocol import EventProtocol
 from fmu_observer.observers.parameter_values import parameter_values
 from fmus.isolation.limits import OwnProcess
+from fmus.isolation.programs import IsolationUnavailable, isolation_programs
+from plant_models.disk_cache.files import file_digest
 from plant_models.hybrid import HybridSystem
 from plant_models.hybrid.option import MemberNames
 from plant_models.local_files import files_digest
@@ -35,6 +38,7 @@ from plant_models.user_file import UserFileError, make
 OWN_PACKAGES = ("plant_models", "fmu_observer")
 LATE_PARAMETERS = frozenset({"late_policy", "replay_horizon"})
 
+_AFTER_CRASH = "{0} gets a process of its own, since its file ended one before: {1}. isolate = 'no' prevents that."
 _LASTING = 100
 """Systems that are kept; a sweep over options makes ever new ones."""
 
@@ -132,7 +136,10 @@ def component_factories(
         elif name in systems:
             factories[name] = _of_system(name, table, systems[name], made)
         else:
-            factories[name] = _of_file(name, table, folder, places[name], tolerance, isolate)
+            stated = table.isolate or isolate
+            crash = _crash(table, folder) if stated is None else ""
+            factories[name] = _of_file(name, table, folder, places[name], tolerance, "component" if crash else stated)
+            made.notes += [_AFTER_CRASH.format(name, crash)] if crash else []
         if table.can_be_missing:
             factories[name] = partial(_declared, factories[name], table.can_be_missing, places[name])
     return factories, made.notes
@@ -160,13 +167,24 @@ def _of_file(
         return partial(python_component, name, table, where)
     chosen = tolerance if table.tolerance is None else table.tolerance
     path = (folder / table.fmu).resolve()
-    apart = _isolation(table) if (table.isolate or isolate) == "component" else None
+    apart = _own_process(table) if isolate == "component" else None
     return partial(load_fmu, path, name, chosen, table.units, table.interface, table.method, apart)
 
 
-def _isolation(table: ComponentTable) -> OwnProcess:
-    """The process of its own that an FMU gets."""
+def _own_process(table: ComponentTable) -> OwnProcess:
+    """The process that an FMU gets."""
     return OwnProcess(**table.limits.model_dump()) if table.limits is not None else OwnProcess()
+
+
+def _crash(table: ComponentTable, folder: Path) -> str:
+    """How this very FMU ended a process before, where it can be given one of its own; else empty."""
+    if table.fmu is None or table.filter is not None:
+        return ""
+    try:
+        said = noted_crash(file_digest((folder / table.fmu).resolve()))
+        return said if said and isolation_programs() else ""
+    except (OSError, IsolationUnavailable):  # the run says what is the matter
+        return ""
 
 
 def _declared(factory: Callable[[], Component], missing: Sequence[str], where: str) -> Component:

@@ -25,6 +25,7 @@ from typing import Any
 
 from cosim.errors import RunError
 from cosim.process.call_clock import CallClock
+from cosim.process.crashes import remember_crash
 from cosim.process.last_call import make_page
 from cosim.runs.job import Ended, Failure, Job, pickled
 from plant_models.left_behind import owned
@@ -173,9 +174,11 @@ class _Worker:
         """How the process ended."""
         with suppress(subprocess.TimeoutExpired):
             self.process.wait(_STOP_SECONDS)
+        code = self.process.returncode
+        if self._why or not (self._last.noted or code in _FROM_OUTSIDE):
+            remember_crash(self._last, self._clock.over_limit or _how_it_ended(code))
         if said := self._why or self._last.noted:
             return Failure(said)
-        code = self.process.returncode
         words = ": ".join(filter(None, (self._last.words(), _how_it_ended(code))))
         return Failure(words, outside=code in _FROM_OUTSIDE)
 

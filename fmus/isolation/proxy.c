@@ -126,8 +126,10 @@ static void put_away(Session *s) {
         while (!reaped(s->supervisor, LOOK_SECONDS) && now() < until)
             ;
         const bool ended = atomic_load(&s->supervision->ended) == EXITED && s->supervision->code == PUT_AWAY;
-        if (!ended)
-            note_death(s, atomic_load(&s->supervision->ended) == LIVES ? "has not returned" : NULL);
+        if (!ended && atomic_load(&s->supervision->ended) == LIVES && now() >= until)
+            note_overdue(s);
+        else if (!ended)
+            note_death(s, NULL);
         if (reaped(s->supervisor, 0.0))
             s->supervisor = 0;
     }

@@ -157,6 +157,12 @@ static double patience_seconds(void) {
     return limit > 0.0 && limit < 1e9 ? limit - margin : 1e9;
 }
 
+static void note_overdue(Session *s) {
+    char why[128];
+    snprintf(why, sizeof why, "has not returned for %g s, the limit of a call, which call_timeout sets", *options.limit);
+    note_death(s, why);
+}
+
 /* Wait for what the process says next. False where it has ended, or took too long and was ended. */
 static bool await(Session *s) {
     if (comes_soon(&s->patience, &s->answering->number, s->number))
@@ -173,9 +179,7 @@ static bool await(Session *s) {
         }
         const double left = until - now();
         if (left <= 0.0) {
-            char why[128];
-            snprintf(why, sizeof why, "has not returned for %g s, the limit of a call, which call_timeout sets", *options.limit);
-            note_death(s, why);
+            note_overdue(s);
             break;
         }
         sleep_while(&s->answering->number, seen, left < LOOK_SECONDS ? left : LOOK_SECONDS);

@@ -60,6 +60,7 @@ def ordinary_signals() -> Iterator[None]:
 
 def hostile(fmu: Path, deed: str, **master: Any) -> Scenario:
     parameters = {"deed": float(DEEDS.index(deed))}
+    master = {"isolate": "no"} | master  # whatever it did before
     return Scenario(stop=0.5, step=0.01, master=master).add("bad", fmu=str(fmu), log="all", parameters=parameters)
 
 
@@ -337,7 +338,8 @@ def test_pytest_is_not_green(fmu: Path, tmp_path: Path) -> None:
     (tmp_path / "test_it.py").write_text(
         "from cosim import Scenario\n"
         "def test_bad():\n"
-        f"    s = Scenario(stop=0.5, step=0.01).add('bad', fmu={str(fmu)!r}, parameters={{'deed': 1.0}})\n"
+        "    s = Scenario(stop=0.5, step=0.01, master={'isolate': 'no'})\n"
+        f"    s.add('bad', fmu={str(fmu)!r}, parameters={{'deed': 1.0}})\n"
         "    s.run()\n"
     )
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_it.py"]

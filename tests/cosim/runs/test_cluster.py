@@ -93,7 +93,7 @@ def studied(fmu: Path, folder: Path) -> Scenario:
     """An FMU that may crash, a model in a file that imports another one, and chance."""
     (folder / "model.py").write_text(MODEL)
     (folder / "neighbour.py").write_text("GROWTH = 0.5\n")
-    scenario = Scenario(folder=folder, stop=0.5, step=0.01).add("bad", fmu=str(fmu))
+    scenario = Scenario(folder=folder, stop=0.5, step=0.01, master={"isolate": "no"}).add("bad", fmu=str(fmu))
     return scenario.add("growing", model="model.py:Growing")
 
 

@@ -75,7 +75,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def three(fmu: Path) -> Scenario:
-    return Scenario(stop=0.5, step=0.01).add("bad", fmu=str(fmu))
+    return Scenario(stop=0.5, step=0.01, master={"isolate": "no"}).add("bad", fmu=str(fmu))
 
 
 DEED = {"bad.deed": [0.0, float(DEEDS.index("crashes")), 0.0], "stop": [0.4, 0.5, 0.5]}
