@@ -211,7 +211,7 @@ def test_values_show_their_curves_in_a_notebook(outcome: cosim.Outcome) -> None:
     heavier = small().set("locomotive.mass", 95e3).run(warn=lambda _: None)
     sweep = small().vary({"observer.estimated_speed": [9.0, 10.0, 11.0]}).run()
     values: list[tuple[Any, int, list[str]]] = [
-        (outcome, 2, ["Speed [m/s]", "Speed error [m/s]"]),
+        (outcome, 2, ["Speed [km/h]", "Speed error [m/s]"]),
         (cosim.compare(outcome, heavier), 2, ["Error of "]),
         (sweep, 2, ["observer.estimated_speed [m/s]", "observer.speed_error_max [m/s]"]),
         (studies.seed_study(small(), range(3), None), 1, ["Maximal speed error, "]),
