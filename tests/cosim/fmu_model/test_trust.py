@@ -7,12 +7,13 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import lying_fmus
 import numpy as np
 import pytest
 from test_fmus.build import linear_fmu
+from test_fmus.events import awkward_fmu
 
 import fmu_observer
 import fmus
@@ -48,6 +49,17 @@ def test_a_transition_is_a_step_of_the_run() -> None:
     whole = model.read()[0]
     middle, _ = model.transition(0.0, 0.1, x, u)
     np.testing.assert_array_equal(model.transition(0.1, 0.1, middle, u)[0], whole)
+    model.close()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("step", [1.0 / 60.0, 0.1])
+def test_a_step_is_handed_over_as_it_is_wherever_it_begins(tmp_path: Path, version: Literal[2, 3], step: float) -> None:
+    """The FMU refuses lengths that are no whole multiples of its input; ``(t + h) - t`` is none but for rounding."""
+    model = open_model(awkward_fmu(tmp_path, "exact-steps", f"exact{version}", version=version), states=())
+    model.restart(1e4, np.zeros(0), np.array([step]))
+    for k in range(20):
+        model.advance(1e4 + k * step, step)
     model.close()
 
 
