@@ -27,6 +27,7 @@ static const Record *serve(void);
 
 static void answer(uint32_t kind) {
     answering->kind = kind;
+    answering->log_seen = atomic_load(&answering->log_end);
     post(&answering->number, answered, &asking->sleeps);
 }
 

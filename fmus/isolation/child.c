@@ -68,7 +68,7 @@ static uint64_t passed_word(const Record *r, const Passed *p, char code) {
     }
 }
 
-static int64_t perform(const Record *r, uint32_t batch) {
+static int64_t perform(const Record *r, uint32_t number) {
     const Function *f = &FUNCTIONS[r->function];
     uint64_t a[ARGUMENTS_AT_MOST] = {0};
     double d[DOUBLES_AT_MOST] = {0};
@@ -97,7 +97,7 @@ static int64_t perform(const Record *r, uint32_t batch) {
     if (f->part == INSTANTIATE)
         instance = (void *)said;
     reply->log_end = atomic_load(&answering->log_end);
-    reply->batch = batch;
+    reply->number = number;
     return reply->value = said;
 }
 
@@ -115,17 +115,18 @@ static const Record *behind(const Record *r) {
 }
 
 static void perform_all(const Record *r) {
+    const uint32_t number = answered; /* callbacks count on */
     for (; r->function != N_STOP; r = behind(r)) {
-        const int64_t said = perform(r, r->batch);
+        const int64_t said = perform(r, number);
         const int part = FUNCTIONS[r->function].part;
         if (said > WARNING_STATUS && part != INSTANTIATE)
             return;
-        if (part != STEP || !r->wanted || !quiet(r))
+        if (part != STEP || !asking->wanted || !quiet(r))
             continue;
         const Record *end = (const Record *)(requests + asking->ahead);
         for (const Record *get = (const Record *)requests; get < end; get = behind(get))
             if (get->wanted)
-                perform(get, r->batch);
+                perform(get, number);
     }
 }
 

@@ -23,7 +23,6 @@ static void begin_anew(Session *s) {
     s->used = s->base;
     s->reply_used = s->depth == 0 ? AHEAD_BYTES : s->reply_used;
     s->waiting = 0;
-    s->batch++;
 }
 
 /* What the FMU printed past its logger, as messages. */
@@ -46,8 +45,8 @@ static void tell_printed(Session *s) {
 /* What a call said; messages of what was read ahead are told when that is asked for. */
 static int64_t finish(Session *s, const Function *f, const Record *r, const uint64_t *a) {
     const Reply reply = *(const Reply *)(s->replies + r->reply);
-    const bool made = reply.batch == r->batch;
-    const uint64_t end = atomic_load(&s->answering->log_end);
+    const bool made = reply.number == s->sent;
+    const uint64_t end = s->answering->log_seen;
     tell_until(s, f->part == STEP && made && reply.log_end < end ? reply.log_end : end);
     const int64_t waited = waited_status(s);
     if (!made)
@@ -95,9 +94,10 @@ static int64_t made_call(Session *s, const Function *f, const uint64_t *a, const
             return OK_STATUS;
         }
     }
-    if (f->part == STEP && s->running && s->depth == 0) {
-        s->step_batch = s->batch;
-        want_reads_ahead(s, r);
+    if (f->part == STEP) {
+        s->asking->wanted = 0;
+        if (s->running && s->depth == 0)
+            want_reads_ahead(s);
     }
     if (exchange(s)) {
         said = finish(s, f, r, a);

@@ -36,16 +36,16 @@ static void read_ahead(Session *s, const Record *made) {
     s->asking->ahead = (uint32_t)(at + made->bytes);
 }
 
-/* Have those gets made behind a step that were called behind the last one. What has not changed is not written: it stays in the cache of who
-   reads it. */
-static void want_reads_ahead(Session *s, Record *step) {
+/* Have those gets made behind the step that is sent next that were called behind the last one. */
+static void want_reads_ahead(Session *s) {
+    s->stepped = s->number + 1;
     for (int k = 0; k < s->ahead_count; k++) {
         ReadAhead *one = &s->ahead[k];
         if (one->record->wanted != one->called)
             one->record->wanted = one->called;
         if (one->called)
-            one->batch = s->batch;
-        step->wanted |= one->called;
+            one->number = s->stepped;
+        s->asking->wanted |= one->called;
         one->called = false;
     }
 }
@@ -57,10 +57,10 @@ static bool was_read(Session *s, const Function *f, const uint64_t *a, int64_t *
         return false;
     one->called = true;
     const Reply reply = *(const Reply *)(s->replies + one->record->reply);
-    if (one->batch != s->step_batch || reply.batch != s->step_batch)
+    if (one->number != s->stepped || reply.number != s->stepped)
         return false;
     memcpy((void *)a[3], s->replies + one->record->arguments[3].reply, one->record->arguments[3].bytes);
-    const uint64_t end = atomic_load(&s->answering->log_end);
+    const uint64_t end = s->answering->log_seen;
     tell_until(s, reply.log_end < end ? reply.log_end : end);
     *said = reply.value;
     return true;

@@ -67,13 +67,19 @@ static void tell_all(Session *s) {
 
 /* -- a request ------------------------------------------------------------------------------------------------------------ */
 
+/* What has not changed since the last request is not written: it stays in the cache of who reads it. */
+static void keep(void *at, const void *bytes, size_t count) {
+    if (memcmp(at, bytes, count) != 0)
+        memcpy(at, bytes, count);
+}
+
 /* Room for more bytes behind a record that is being written; NULL where there is none. */
 static char *room(Session *s, Record *r, size_t bytes) {
     const size_t at = (size_t)((char *)r - s->requests);
-    if (bytes > AREA_BYTES || at + r->bytes + bytes + PAGE > AREA_BYTES)
+    if (bytes > AREA_BYTES || at + s->filled + bytes + PAGE > AREA_BYTES)
         return NULL;
-    char *made = (char *)r + r->bytes;
-    r->bytes += (uint32_t)aligned(bytes);
+    char *made = (char *)r + s->filled;
+    s->filled += aligned(bytes);
     return made;
 }
 
@@ -82,7 +88,7 @@ static bool add_bytes(Session *s, Record *r, Passed *p, const void *bytes, size_
     p->value = to == NULL ? NONE : (uint64_t)(to - (char *)r);
     p->bytes = (uint32_t)count;
     if (to != NULL)
-        memcpy(to, bytes, count);
+        keep(to, bytes, count);
     return bytes == NULL || to != NULL;
 }
 
@@ -135,9 +141,8 @@ static uint32_t reply_room(Session *s, size_t bytes) {
     return at;
 }
 
-static bool add_argument(Session *s, Record *r, const Function *f, int k, const uint64_t *a, const double *d) {
+static bool add_argument(Session *s, Record *r, Passed *p, const Function *f, int k, const uint64_t *a, const double *d) {
     const Argument *argument = &f->arguments[k];
-    Passed *p = &r->arguments[k];
     const uint64_t word = a[argument->word];
     const size_t count = counted(argument, a);
     switch (argument->code) {
@@ -162,27 +167,26 @@ static Record *add_call(Session *s, const Function *f, const uint64_t *a, const 
     const size_t size = aligned(sizeof *r + (size_t)f->argument_count * sizeof(Passed)), replies = s->reply_used;
     if (s->used + size + PAGE > AREA_BYTES)
         return NULL;
-    memset(r, 0, size);
-    r->function = (uint32_t)(f - FUNCTIONS);
-    r->bytes = (uint32_t)size;
-    r->reply = reply_room(s, sizeof(Reply));
+    Passed passed[ARGUMENTS_AT_MOST] = {{0}};
+    Record head = {.function = (uint32_t)(f - FUNCTIONS), .reply = reply_room(s, sizeof(Reply))};
+    s->filled = size;
     bool fits = true;
     for (int k = 0; fits && k < f->argument_count; k++)
-        fits = add_argument(s, r, f, k, a, d);
+        fits = add_argument(s, r, &passed[k], f, k, a, d);
     if (!fits || s->reply_used > AREA_BYTES) {
         s->reply_used = replies;
         return NULL;
     }
-    r->batch = s->batch;
-    s->used += r->bytes;
+    head.bytes = (uint32_t)s->filled;
+    keep(r, &head, sizeof head);
+    keep(r->arguments, passed, (size_t)f->argument_count * sizeof *passed);
+    s->used += s->filled;
     return r;
 }
 
 static void add_mark(Session *s, uint32_t function) {
     Record *r = request_at(s, s->used);
-    memset(r, 0, sizeof *r);
-    r->function = function;
-    r->bytes = sizeof *r;
+    keep(r, &(Record){.function = function, .bytes = sizeof *r}, sizeof *r);
     s->used += aligned(sizeof *r);
 }
 
@@ -224,7 +228,9 @@ static bool exchange(Session *s) {
     const size_t base = s->base, first = s->base;
     add_mark(s, N_STOP);
     send_request(s, first);
+    const uint32_t sent = s->number;
     while (!s->dead && await(s)) {
+        s->sent = sent;
         if (s->answering->kind == REPLY)
             return true;
         const size_t used = s->used, replies = s->reply_used;
@@ -294,7 +300,7 @@ static int64_t waited_status(Session *s) {
     const Record *r = request_at(s, s->base);
     for (int k = 0; k < s->waiting; k++, r = (const Record *)((const char *)r + r->bytes)) {
         const Reply reply = *(const Reply *)(s->replies + r->reply);
-        const int64_t said = reply.batch == r->batch ? reply.value : OK_STATUS;
+        const int64_t said = reply.number == s->sent ? reply.value : OK_STATUS;
         if (said == OK_STATUS)
             continue;
         s->strict = true; /* from now on every set says for itself what it has to say */

@@ -23,7 +23,7 @@ typedef struct {
 typedef struct { /* a get that is made ahead, right behind the step */
     Record *record;
     bool called;    /* behind the last step */
-    uint32_t batch; /* of the last step that it was made behind */
+    uint32_t number; /* of the last request that it was made in */
 } ReadAhead;
 
 typedef struct Session {
@@ -44,7 +44,8 @@ typedef struct Session {
     ReadAhead ahead[READ_AHEAD];
     int ahead_count;
     size_t ahead_replies;
-    uint32_t batch, step_batch; /* number of the request that is made up, and of the last step */
+    size_t filled;        /* bytes of the record that is being written */
+    uint32_t sent, stepped; /* numbers of the last request, and of the last step */
     uint64_t log_told;
     char name[256], *texts;
     const char *outside; /* what is done where no function of FMI is called */
@@ -281,12 +282,12 @@ static Session *open_session(void) {
         map(s, memory);
     int error = errno;
     if (s->console >= 0 && s->shared != NULL) {
+        s->answering->current = -1;
         error = spawn(s, memory);
     }
     if (memory >= 0)
         close(memory);
     s->number = 1;
-    s->batch = 1;
     s->base = s->used = s->reply_used = AHEAD_BYTES;
     if (s->supervisor == 0)
         say("its process cannot be started: %s", strerror(error));

@@ -68,7 +68,8 @@ typedef struct {
 typedef struct { /* written by the proxy */
     _Atomic uint32_t number, sleeps;
     uint32_t first; /* where the request begins */
-    uint32_t ahead; /* where the gets end that are made behind each step, from the beginning of the requests on */
+    uint32_t ahead; /* where the gets end that are made behind a step, from the beginning of the requests on */
+    uint32_t wanted; /* whether some are to be made behind this one */
     OWN_LINE uint64_t log_taken; /* messages up to here have been taken */
 } Asking;
 
@@ -76,6 +77,7 @@ enum { REPLY, LOG_FULL, INTERMEDIATE_UPDATE, CLOCK_UPDATE, LOCK_PREEMPTION, UNLO
 typedef struct { /* written by the child */
     _Atomic uint32_t number, sleeps;
     uint32_t kind;
+    uint64_t log_seen; /* where the messages ended when this was said */
     OWN_LINE int32_t current; /* number of the function that is being called; -1 for none */
     uint8_t flags[4];
     double time; /* of an intermediate update [s] */
@@ -93,16 +95,16 @@ typedef struct {
 
 typedef struct {
     uint32_t function, bytes; /* all of it; the next one is behind it */
-    uint32_t reply, batch;    /* the number of the request */
-    uint8_t kept, wanted;     /* filled over what was there before; of those behind a step, whether it is to be made */
-    uint8_t unused[14];
+    uint32_t reply;
+    uint8_t kept, wanted; /* filled over what was there before; of those behind a step, whether it is to be made */
+    uint8_t unused[2];
     Passed arguments[];
 } Record;
 
 typedef struct {
     int64_t value;    /* status, or an address */
     uint64_t log_end; /* the messages up to here were written until its end */
-    uint32_t batch;   /* of the request; where it is another one, this call did not come about */
+    uint32_t number;  /* of the request; where it is another one, this call did not come about */
 } Reply;
 
 typedef struct { /* a message: text of the category, text of the message; kind 0, or 1 where a step was finished */
