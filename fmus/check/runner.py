@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from time import perf_counter
@@ -12,6 +13,7 @@ from fmpy.model_description import ModelDescription
 
 from fmus.fmi.instance import FAILURES
 from fmus.fmi.slave import Slave
+from fmus.fmi.types import FLOATING_TYPES
 
 WARM_UP_STEPS = 5
 SLOW_STEPS = 25  # a quarter of a second at the usual step: what is sampled at 10 Hz moves in it
@@ -20,6 +22,9 @@ _SPREADS = (0.0, 0.1)
 MOVING = (None, "continuous", "discrete")
 END = 1e6
 """Stop time that is announced where the FMU has no default experiment, seconds after the start [s]."""
+
+_ROUNDINGS = 4.0
+"""So many last digits apart are one instant: of the sum, the quotient and the product, and one to spare."""
 
 _READ_AT_MOST = 200
 """Local variables that are read where there is no output."""
@@ -163,7 +168,7 @@ class Runner(AbstractContextManager["Runner"]):
         return self._outputs.copy()
 
     def set_inputs(self, amplitude: float) -> None:
-        """All continuous inputs to this much above their start values, more from one to the next where a spread is set.
+        """All that are moved to this much above their start values, more from one to the next where a spread is set.
 
         Nothing goes beyond a declared range.
 
@@ -176,7 +181,7 @@ class Runner(AbstractContextManager["Runner"]):
 
     @property
     def inputs(self) -> dict[str, float]:
-        """What the continuous inputs were set to, by name."""
+        """What the inputs that are moved were set to, by name."""
         return dict(zip(self._input_names, self._inputs.tolist(), strict=True))
 
     def steps(self, pattern: Sequence[float]) -> list[np.ndarray]:
@@ -206,8 +211,17 @@ class Runner(AbstractContextManager["Runner"]):
         self.component.advance(self.now, self.now + h)
         if self.component.terminated:
             return []
-        self.now += h
+        self.now = self._instant(self.now + h)
         return [self.outputs()]
+
+    def _instant(self, t: float) -> float:
+        """Where a run stands that counts its steps from the start, where `t` [s] is that but for rounding.
+
+        Added up, a thousand steps end some roundings behind the end of the experiment, where no run goes and some
+        FMUs refuse to.
+        """
+        counted = self.t0 + round((t - self.t0) / self.h) * self.h
+        return counted if abs(counted - t) <= _ROUNDINGS * math.ulp(max(abs(t), abs(self.t0), self.h)) else t
 
     def _renew(self) -> None:
         if self._started:
@@ -220,7 +234,7 @@ class Runner(AbstractContextManager["Runner"]):
         names = self.output_names
         self._outputs = np.zeros(len(names))
         self._read = component.reader(names, self._outputs)
-        inputs = [n for n in component.names("input") if component.variables[n].variability in (None, "continuous")]
+        inputs = self._moved_inputs()
         self._write, self._inputs = component.writer(inputs)
         self._input_names = inputs
         declared = [component.variables[n] for n in inputs]
@@ -229,6 +243,13 @@ class Runner(AbstractContextManager["Runner"]):
         self._inputs[:] = self._own
         self._lowest = np.array([_number(v.min, -np.inf) for v in declared])
         self._highest = np.array([_number(v.max, np.inf) for v in declared])
+
+    def _moved_inputs(self) -> list[str]:
+        """Names of the inputs that are moved: the continuous ones; sampled ones where there are none, and no events."""
+        names, variables = self.component.names("input"), self.component.variables
+        continuous = [n for n in names if variables[n].variability in (None, "continuous")]
+        sampled = [n for n in names if variables[n].type in FLOATING_TYPES and not self.component.events]
+        return continuous or sampled
 
 
 def end_of_experiment(description: ModelDescription, start_time: float) -> float:

@@ -27,6 +27,8 @@ with suppress(ImportError):  # exists on POSIX systems only
 
 FLOATS = "the rounding of floating-point numbers"
 PLACE = "the working directory"
+CHARACTERS = "the locale of characters"
+_LOCALE = "the locale"
 _STREAMS = "the standard streams"
 _SIGNALS, _VARIABLES = "the response to", "the environment variables"
 ENVIRONMENT_BYTES = 256  # more than any fenv_t
@@ -166,6 +168,18 @@ def _speak(name: str) -> None:
     locale.setlocale(locale.LC_ALL, name)
 
 
+def _spoken(before: str, now: str) -> str:
+    """What became of the locale: numbers, dates and the order of texts may have changed, or only the characters."""
+    return "" if before == now else CHARACTERS if _besides_characters(before) == _besides_characters(now) else _LOCALE
+
+
+def _besides_characters(name: str) -> str:
+    """A locale without its LC_CTYPE: one name where the other categories agree, as C states it where all do."""
+    others = [part for part in name.split(";") if not part.startswith("LC_CTYPE=")]
+    names = {part.partition("=")[2] or part for part in others}
+    return names.pop() if len(names) == 1 else ";".join(others)
+
+
 def _response() -> _Response | None:
     """What is done at SIGINT, which Python's own module does not know; None where that cannot be asked."""
     action, library = (ctypes.c_void_p * _ACTION_WORDS)(), _library()
@@ -258,7 +272,7 @@ def is_left(change: str) -> bool:
 _INTERRUPT = f"{_SIGNALS} Ctrl-C"
 _ASPECTS = (
     _Aspect(_as_it_was(PLACE), _here, os.chdir),
-    _Aspect(_as_it_was("the locale"), lambda: locale.setlocale(locale.LC_ALL), _speak),
+    _Aspect(_spoken, lambda: locale.setlocale(locale.LC_ALL), _speak),
     _Aspect(_as_it_was(_INTERRUPT), _response, _respond),
     _Aspect(_as_it_was("the permissions of new files"), _mask, os.umask),
 )

@@ -39,6 +39,7 @@ typedef struct {
     int logging;
 } Instance;
 
+static double announced_end; /* LIE_STRICT_END, which is no lie: no step goes beyond it, not by a rounding */
 static double shared; /* LIE_SHARED: the steps of all instances since one of them began */
 
 #define DATA(c) (((Instance *)(c))->data)
@@ -133,6 +134,9 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 #ifdef LIE_LEAKS_MEMORY
     memset(malloc(100000), 1, 100000);
 #endif
+#ifdef LIE_LEAKS_LITTLE
+    memset(malloc(30000), 1, 30000);
+#endif
 #ifdef LIE_DAEMON
     if (fork() == 0) {
         setsid();
@@ -161,6 +165,7 @@ void fmi2FreeInstance(fmi2Component c) {
 }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real tol, fmi2Real start, fmi2Boolean sd, fmi2Real stop) {
     DATA(c).time = start;
+    announced_end = sd ? stop : INFINITY;
     return fmi2OK;
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
@@ -360,6 +365,10 @@ static void do_harm(Instance *instance) {
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_set_state) {
     Instance *instance = c;
+#ifdef LIE_STRICT_END
+    if (t + h > announced_end)
+        return fmi2Error;
+#endif
 #ifdef LIE_FORKS
     if (fork() == 0)
         for (;;)

@@ -72,7 +72,6 @@ def test_the_honest_one_passes_clean(tmp_path: Path) -> None:
         ("WRITES_FILE", "written files", LIMIT, "it writes into the working directory: own.log"),
         ("MOVES", "surroundings", LIMIT, "it changed the working directory"),
         ("ROUNDS", "surroundings", LIMIT, "it changed the rounding of floating-point numbers"),
-        ("LOCALISES", "surroundings", LIMIT, "it changed the locale"),
         ("TAKES_INTERRUPTS", "surroundings", LIMIT, "it changed the response to Ctrl-C"),
         ("HANDLES_SIGNALS", "surroundings", LIMIT, "it changed the response to SIGTERM"),
         ("LOWERS_LIMITS", "surroundings", LIMIT, "it changed the limits RLIMIT_NOFILE"),
@@ -122,6 +121,13 @@ def test_a_lie_is_caught_by_name(lie: str, check: str, meaning: Verdict, words: 
     assert words in finding.detail
     assert report.verdict is not Class.USE
     assert (report.verdict is Class.DISTRUST) or finding.advice
+
+
+def test_another_locale_of_characters_is_told_and_limits_nothing(tmp_path: Path) -> None:
+    """What Dymola's FMUs do, and what a run puts back: no number is written otherwise."""
+    finding = checked(tmp_path, "LOCALISES").finding("surroundings")
+    assert finding.verdict is NOTE, finding
+    assert finding.detail == "it changed the locale of characters, which a run puts back"
 
 
 @pytest.mark.parametrize(
@@ -221,6 +227,18 @@ def test_an_end_where_no_second_instance_is_allowed_is_named_too(tmp_path: Path)
 def test_an_error_of_terminate_is_noted(tmp_path: Path) -> None:
     report = checked(tmp_path, "REFUSES_END")
     assert problems(report) == {"terminate and free": "terminate failed: fmi2Terminate failed with status 3 (error)"}
+    assert report.verdict is Class.USE
+
+
+def test_no_step_goes_a_rounding_beyond_the_announced_end(tmp_path: Path) -> None:
+    """0.01 s added up 100 times is 1.0000000000000007 s; a run counts its steps, and its last one ends at 1 s."""
+    xml = description().replace('stopTime="10"', 'stopTime="1"')
+    assert problems(checked(tmp_path, "STRICT_END", xml=xml)) == {}
+
+
+def test_what_an_instance_keeps_and_no_study_feels_is_noted(tmp_path: Path) -> None:
+    report = checked(tmp_path, "LEAKS_LITTLE")
+    assert set(problems(report)) == {"repeated instantiation"}
     assert report.verdict is Class.USE
 
 

@@ -4,6 +4,7 @@ runs.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -124,3 +125,39 @@ def test_an_alias_is_its_variable() -> None:
     alias = ModelVariable(name="mass.v", valueReference=2, type="Float64", causality="output", alias=own)
     described = SimpleNamespace(description=SimpleNamespace(modelVariables=[own, alias]))
     assert FmuInstance.names(described, "output") == ["v"]  # type: ignore[arg-type]
+
+
+def test_steps_are_counted_and_others_stand_where_they_end(tmp_path: Path) -> None:
+    """Equal to the instants of a run, which are products, to the last digit; a shorter step is no multiple."""
+    with runner_of(build(tmp_path)) as runner:
+        runner.begin()
+        seen = []
+        for _ in range(1000):
+            runner.step(0.01)
+            seen.append(runner.now)
+        assert seen == [k * 0.01 for k in range(1, 1001)]
+        runner.step(0.003137)
+        assert runner.now == 10.0 + 0.003137
+
+
+def _without_pulse(xml: str) -> str:
+    return re.sub(r'    <ScalarVariable name="pulse_\w+".*?</ScalarVariable>\n', "", xml, flags=re.DOTALL)
+
+
+def test_a_sampled_input_is_moved_where_no_continuous_one_is_there(tmp_path: Path) -> None:
+    """From rest, nothing but the force moves it."""
+    xml = _without_pulse(description()).replace('"input" variability="continuous"', '"input" variability="discrete"')
+    with runner_of(build(tmp_path, xml=xml), {"speed": 0.0}) as runner:
+        assert runner.excite()
+        assert runner.amplitude > 0.0
+
+
+def test_what_has_no_inputs_and_never_moves_is_noted(tmp_path: Path) -> None:
+    """A constant: to the end of its experiment a run meets nothing else. With an input it would not be known."""
+    xml = _without_pulse(description())
+    driven = xml.replace('<Real start="1"/>', '<Real start="0"/>')
+    alone = driven.replace('causality="input" variability="continuous"', 'causality="parameter" variability="tunable"')
+    for name, one, seen in (("alone", alone, Verdict.NOTE), ("driven", driven, Verdict.PASS)):
+        finding = check_fmu(build(tmp_path / name, xml=one), starts={"speed": 0.0}).finding("stepping")
+        assert finding.verdict is seen, finding
+        assert ("nothing moves to the end of its experiment" in finding.detail) == (seen is Verdict.NOTE)

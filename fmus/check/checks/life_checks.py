@@ -17,7 +17,7 @@ from fmus.check.check import DISTRUST, LIMIT, MISSING, NOTE, Check
 from fmus.check.checked_instance import SlaveError
 from fmus.check.context import Context
 from fmus.check.findings import CheckOutcome, Verdict, failed, limited, noted, passed
-from fmus.check.runner import SLOW_STEPS, WARM_UP_STEPS, Runner
+from fmus.check.runner import END, SLOW_STEPS, WARM_UP_STEPS, Runner
 from fmus.fmi.instance import Instance
 from fmus.fmi.library import functions_of_capabilities
 from fmus.fmi.types import FLOATING_TYPES
@@ -57,12 +57,34 @@ def _run(context: Context) -> CheckOutcome:
     if not runner.output_names:
         return limited(f"{done}; it has no number that moves and can be read", UNSEEN)
     if not runner.excited:
-        return limited(f"{done}; nothing moved in the first {SLOW_STEPS}, what follows is weak", UNSEEN)
+        return _unmoved(context, done)
     late = f"; {context.steps} were asked for, use a longer --timeout" if len(rows) < context.steps else ""
     above = (
         f"inputs {runner.amplitude:g} above their start values" if runner.amplitude else "inputs at their start values"
     )
     return passed(f"{done}, {above}{late}")
+
+
+def _unmoved(context: Context, done: str) -> CheckOutcome:
+    """Nothing moved so far. Without inputs, what stays so to the end of the experiment is all that a run meets."""
+    driven = any(variable.causality == "input" for variable in context.description.modelVariables)
+    with suppress(SlaveError):  # which the long run reports
+        if not driven and context.runner.end < context.start_time + END and _still(context):
+            return noted(f"{done}; it has no inputs, and nothing moves to the end of its experiment")
+    return limited(f"{done}; nothing moved in the first {SLOW_STEPS}, what follows is weak", UNSEEN)
+
+
+def _still(context: Context) -> bool:
+    """Whether nothing moves to the end of the experiment; not, where that takes longer than there is time."""
+    runner, since = context.runner, perf_counter()
+    before = runner.begin()
+    while runner.now < runner.end - 0.5 * runner.h:
+        row = runner.step(runner.h)
+        if not row or not np.array_equal(row[0], before, equal_nan=True):
+            return False
+        if perf_counter() - since > SHARE_OF_BUDGET * context.budget:
+            return False
+    return True
 
 
 # -- helpers ----------------------------------------------------------------------------------------------------------

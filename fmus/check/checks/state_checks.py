@@ -5,12 +5,12 @@ from __future__ import annotations
 from fmus.check.behaviour import again, continuation, difference, go_elsewhere
 from fmus.check.check import BYTES, LIMIT, NO_BYTES, NO_REDOING, STATES, Check
 from fmus.check.context import Context
-from fmus.check.findings import CheckOutcome, failed, limited, passed
+from fmus.check.findings import CheckOutcome, failed, noted, passed
 from fmus.check.restoring import near, restoring
 from fmus.check.runner import WARM_UP_STEPS
 from fmus.fmi.slave import Slave
 
-WITHIN = "steps may be redone, and what is redone differs by as much; the master states it in its bounds"
+_WITHIN = "within the tolerance of its solver"
 
 
 def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
@@ -35,9 +35,7 @@ def _through_bytes(context: Context, *, elsewhere: bool) -> CheckOutcome:
     if not problem:
         return passed(f"what follows a state restored {place} is identical")
     what = f"after a state restored {place} {problem}"
-    return (
-        limited(f"{what}; within the tolerance of its solver", WITHIN) if near(runner, first, redone) else failed(what)
-    )
+    return noted(f"{what}; {_WITHIN}") if near(runner, first, redone) else failed(what)
 
 
 def _saved(slave: Slave) -> bytes:
@@ -67,9 +65,7 @@ class StateRoundTripCheck(Check, failing=LIMIT, advice=NO_REDOING, compares=True
         if found.restores == "exact":
             return passed("what follows a restored state is identical, bit for bit")
         if found.restores == "within_tolerance":
-            return limited(
-                f"{found.problem}; within the tolerance of its solver, {found.mismatch:.1g} of its size", WITHIN
-            )
+            return noted(f"{found.problem}; {_WITHIN}, {found.mismatch:.1g} of its size, which goes into the bounds")
         return failed(f"not restored: {found.problem}")
 
 
