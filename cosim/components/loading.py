@@ -47,7 +47,6 @@ _LINK_MAP = 2  # dlinfo: RTLD_DI_LINKMAP
 _brought: dict[str, tuple[Path, str]] = {}
 """For every library that an FMU brought into this process, by its path: the FMU, and the digest of the library."""
 
-
 _MAGIC = b"\x7fELF"
 _DYNAMIC, _LOAD = 2, 1  # types of segments
 _END, _NEEDED, _STRINGS, _SONAME = 0, 1, 5, 14  # entries of the dynamic section

@@ -136,10 +136,9 @@ def component_factories(
         elif name in systems:
             factories[name] = _of_system(name, table, systems[name], made)
         else:
-            stated = table.isolate or isolate
-            crash = _crash(table, folder) if stated is None else ""
-            factories[name] = _of_file(name, table, folder, places[name], tolerance, "component" if crash else stated)
-            made.notes += [_AFTER_CRASH.format(name, crash)] if crash else []
+            chosen, notes = _isolate(name, table, folder, isolate)
+            factories[name] = _of_file(name, table, folder, places[name], tolerance, chosen)
+            made.notes += notes
         if table.can_be_missing:
             factories[name] = partial(_declared, factories[name], table.can_be_missing, places[name])
     return factories, made.notes
@@ -174,6 +173,15 @@ def _of_file(
 def _own_process(table: ComponentTable) -> OwnProcess:
     """The process that an FMU gets."""
     return OwnProcess(**table.limits.model_dump()) if table.limits is not None else OwnProcess()
+
+
+def _isolate(
+    name: str, table: ComponentTable, folder: Path, isolate: Isolate | None
+) -> tuple[Isolate | None, list[str]]:
+    """What of an FMU runs in a process of its own, and a note where nobody has said so."""
+    stated = table.isolate or isolate
+    crash = _crash(table, folder) if stated is None else ""
+    return ("component", [_AFTER_CRASH.format(name, crash)]) if crash else (stated, [])
 
 
 def _crash(table: ComponentTable, folder: Path) -> str:

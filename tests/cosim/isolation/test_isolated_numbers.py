@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 from harmful_fmus import processes_of_fmus
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from test_fmus.build import linear_fmu
 from test_fmus.events import (
@@ -167,6 +167,7 @@ def lags(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
 
 @pytest.mark.parametrize("version", [1, 2, 3])
 @settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
+@example(calls=[("get", 0.0), ("step", 0.0), ("get", 0.0), ("step", 0.0), ("set", 5.0), ("get", 0.0)])
 @given(calls=st.lists(st.tuples(st.sampled_from(CALLS), st.floats(-1e6, 1e6)), max_size=40))
 def test_calls_in_any_order_answer_the_same(
     lags: dict[int, Path], version: int, calls: list[tuple[str, float]]
