@@ -103,9 +103,23 @@ class ExchangeModel(SealedModel):
             States at its end, shape (n,), and the Jacobian, shape (n, n); None where an event lies in the step, over
             which this equation does not hold.
         """
-        n, rows = len(x), self.derivative_names
+        n, end = len(x), t + h
         self.restart(t, x, u)
-        before, end = self._signs(), t + h
+        before, solver = self._signs(), self._variational_solver(n, u)
+        whole = solver.states
+        whole[:] = np.concatenate([x, np.eye(n).ravel()])
+        try:
+            solver.run(t, end)
+        except SolverError as error:
+            raise FmuModelError(f"{self.path}: its derivatives cannot be integrated from {t:g} s: {error}.") from error
+        self.move(end, whole[:n], u)
+        if self.instance.next_event <= end or (self._signs() != before).any():
+            return None
+        return whole[:n].copy(), whole[n:].reshape(n, n).copy()
+
+    def _variational_solver(self, n: int, u: Array) -> Cvode:
+        """Of states and their Jacobian by those at the start, row by row, under held inputs, shape (m,)."""
+        rows, size = self.derivative_names, n + n * n
 
         def rates(instant: float, at: Any, written: Any) -> int:
             here, found = np.ctypeslib.as_array(at), np.ctypeslib.as_array(written)
@@ -122,18 +136,7 @@ class ExchangeModel(SealedModel):
             ctypes.memmove(columns, np.ascontiguousarray(found).ctypes.data, found.nbytes)
             return 0
 
-        size, tolerance = n + n * n, self.instance.motion.solver.tolerance
-        solver = Cvode(size, 0, rates, rates, tolerance, np.ones(size), jacobian=jacobian)
-        whole = solver.states
-        whole[:] = np.concatenate([x, np.eye(n).ravel()])
-        try:
-            solver.run(t, end)
-        except SolverError as error:
-            raise FmuModelError(f"{self.path}: its derivatives cannot be integrated from {t:g} s: {error}.") from error
-        self.move(end, whole[:n], u)
-        if self.instance.next_event <= end or (self._signs() != before).any():
-            return None
-        return whole[:n].copy(), whole[n:].reshape(n, n).copy()
+        return Cvode(size, 0, rates, rates, self.instance.motion.solver.tolerance, np.ones(size), jacobian=jacobian)
 
     def _signs(self) -> Array:
         """Which event indicators are positive where the instance stands, shape (number of them,)."""

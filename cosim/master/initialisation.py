@@ -60,8 +60,7 @@ def initialise(plan: Plan, start_time: float, stop_time: float, initialised: Cal
     """
     for step in plan.steps:
         step.component.enter_initialization(start_time, stop_time)
-    leaving = ExchangeInInitialization(plan, start_time, stop_time)
-    settling = _Settling(plan, leaving)
+    settling = _Settling(plan, leaving := ExchangeInInitialization(plan, start_time, stop_time))
     changing = settling.run()
     if changing:
         raise _changes_when_read(plan, start_time) or _unsettled(plan, changing, settling.residuals, start_time)

@@ -85,7 +85,7 @@ class ModelCalls:
         )
         self._places: Any = ctypes.byref(self._info)
         if version == 3:
-            self._places = tuple(ctypes.byref(place) for place in (*self._flags, self._due))
+            self._places = (*map(ctypes.byref, self._flags), ctypes.byref(self._due))
         if version > 1:
             self._update = self._made("NewDiscreteStates" if version == 2 else "UpdateDiscreteStates")
 
