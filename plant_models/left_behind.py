@@ -6,6 +6,7 @@ Their names say whose they are. Standard library only.
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import socket
 import sys
@@ -15,32 +16,31 @@ from pathlib import Path
 from tempfile import gettempdir
 
 _HOST = sha256(socket.gethostname().encode()).hexdigest()[:6]
-_swept: set[tuple[str, str]] = set()
-"""Folders and prefixes that this process has looked at."""
+_OWNER = re.compile(rf"[-_]{_HOST}-(\d+)-")
+_swept: set[str] = set()
+"""Folders that this process has looked at."""
 
 
 def owned(prefix: str, folder: Path | str | None = None) -> str:
     """A prefix for a temporary file or folder that says whose it is, as `tempfile` takes it. What processes that are
-    gone have left under it is removed, once in a process.
+    gone have left in the folder under such names is removed, once in a process.
 
     Args:
-        prefix: of all such files. folder: where they lie; None for the one of the machine.
+        prefix: ending in ``-`` or ``_``. folder: where they lie; None for the one of the machine.
     """
     place = str(folder or gettempdir())
-    if (place, prefix) not in _swept and sys.platform != "win32":  # where a process cannot be asked for harmlessly
-        _swept.add((place, prefix))
+    if place not in _swept and sys.platform != "win32":  # where a process cannot be asked for harmlessly
+        _swept.add(place)
         with suppress(OSError):
-            _sweep(place, prefix)
+            _sweep(place)
     return f"{prefix}{_HOST}-{os.getpid()}-"
 
 
-def _sweep(place: str, prefix: str) -> None:
+def _sweep(place: str) -> None:
     with os.scandir(place) as entries:
-        left = [entry for entry in entries if entry.name.startswith(prefix)]
-    for entry in left:
-        host, _, rest = entry.name.removeprefix(prefix).partition("-")
-        number = rest.partition("-")[0]
-        if host != _HOST or not number.isdecimal() or _is_alive(int(number)):
+        left = [(entry, owner) for entry in entries if (owner := _OWNER.search(entry.name))]
+    for entry, owner in left:
+        if _is_alive(int(owner[1])):
             continue
         with suppress(OSError):
             if entry.stat(follow_symlinks=False).st_uid != os.getuid():

@@ -43,26 +43,22 @@ def test_what_the_dead_left_goes_and_what_is_in_use_or_of_others_stays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     living, killed = made(tmp_path, "stays"), made(tmp_path, "killed")
-    own = owned(".other-")
-    (tmp_path / own.replace(".other-", ".writing-")).mkdir()
+    (tmp_path / owned(".writing-")).mkdir()
     (tmp_path / ".writing-results").mkdir()
     (tmp_path / f".writing-ffffff-{2**22 - 1}-abc").mkdir()  # of another machine
     (tmp_path / "x").mkdir()
-    dead = left_behind.owned(".writing-", "/nowhere").replace(str(os.getpid()), str(2**30))
+    dead = owned("fmu_").replace(str(os.getpid()), str(2**30))
     (tmp_path / f"{dead}link").symlink_to(tmp_path / "x")
     before = {path.name for path in tmp_path.iterdir()}
-    prefix = owned(".writing-", tmp_path)
-    assert prefix.startswith(".writing-")
+    assert owned(".made_from-", tmp_path).startswith(".made_from-")
     gone = before - {path.name for path in tmp_path.iterdir()}
-    assert len(gone) == 2  # the folder, and a link, not what it leads to
+    assert len(gone) == 3  # the folder and the file, and a link, not what it leads to
     assert (tmp_path / "x").is_dir()
-    assert list(tmp_path.glob(f".writing-*-{living.pid}-*"))
-    owned(".pack-", tmp_path)
-    assert len(list(tmp_path.glob(".pack-*"))) == 1
+    assert len(list(tmp_path.glob(f".*-{living.pid}-*"))) == 2
     living.communicate("")
-    assert owned(".pack-", tmp_path)
-    assert len(list(tmp_path.glob(".pack-*"))) == 1  # once in a process
+    owned(".pack-", tmp_path)
+    assert len(list(tmp_path.glob(f".*-{living.pid}-*"))) == 2  # once in a process
     monkeypatch.setattr(left_behind, "_swept", set())
     owned(".pack-", tmp_path)
-    assert not list(tmp_path.glob(".pack-*"))
+    assert not list(tmp_path.glob(f".*-{living.pid}-*"))
     killed.wait()
