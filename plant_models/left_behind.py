@@ -8,14 +8,13 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import socket
 import sys
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from tempfile import gettempdir
 
-_HOST = sha256(socket.gethostname().encode()).hexdigest()[:6]
+_HOST = sha256(os.uname().nodename.encode()).hexdigest()[:6] if hasattr(os, "uname") else "000000"
 _OWNER = re.compile(rf"[-_]{_HOST}-(\d+)-")
 _swept: set[str] = set()
 """Folders that this process has looked at."""

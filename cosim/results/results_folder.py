@@ -139,6 +139,7 @@ def write_results(result: ResultData, directory: str | Path, formats: Sequence[s
             (folder / usual_file(stale)).unlink(missing_ok=True)
         if not result.packets:
             (folder / PACKETS).unlink(missing_ok=True)
+        (folder / BLOCK_FILE).unlink(missing_ok=True)  # of a stream whose program was killed
     except OSError as error:
         hint = "Free the disk, or close the program that has the file open."
         raise OutputError(f"Results could not be written to {folder}: {_reason(error)}. {hint}") from error
