@@ -11,6 +11,7 @@ import io
 import json
 import tempfile
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal
 
@@ -52,25 +53,37 @@ def parse_table(text: str, header: Header, file: Path) -> np.ndarray:
     """
     if not text.strip():
         raise BaselineError(f"{file} is empty; {header.rows} rows were written. {_WRITE_AGAIN}")
-    reader = csv.reader(io.StringIO(text))
-    names = next(reader)
+    first, _, body = text.partition("\n")
+    names = next(csv.reader([first]))
     wanted = ["time", *(info.name for info in header.signals)]
-    missing = [name for name in wanted if name not in names]
+    places = {name: place for place, name in reversed(list(enumerate(names)))}
+    missing = [name for name in wanted if name not in places]
     if missing:
         raise BaselineError(f"{file}: no column {missing[0]!r}, which the header names. {_WRITE_AGAIN}")
-    rows = [_numbers(row, len(names), file, reader.line_num) for row in reader if row]
+    rows = _all_numbers(body, len(names), file)
     if len(rows) != header.rows or not text.endswith("\n"):
         raise BaselineError(
             f"{file} is cut off or was added to: {len(rows)} rows, {header.rows} were written. {_WRITE_AGAIN}"
         )
-    values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
     table = np.empty(len(rows), table_dtype(wanted))
     for name in wanted:
-        table[name] = values[:, names.index(name)]
+        table[name] = rows[:, places[name]]
     if np.any(np.diff(table["time"]) < 0.0):
         line = int(np.flatnonzero(np.diff(table["time"]) < 0.0)[0]) + 3
         raise BaselineError(f"{file}, line {line}: time runs backwards. {_WRITE_AGAIN}")
     return table
+
+
+def _all_numbers(body: str, count: int, file: Path) -> np.ndarray:
+    """The numbers of the lines behind the heading, `count` in each, shape (rows, count)."""
+    if body.strip():
+        with suppress(ValueError):
+            values = np.loadtxt(io.StringIO(body), delimiter=",", ndmin=2, comments=None)
+            if values.shape[1] == count:
+                return values
+    reader = csv.reader(io.StringIO(body))  # for what is wrong in words
+    rows = [_numbers(row, count, file, reader.line_num + 1) for row in reader if row]
+    return np.array(rows, dtype=np.float64).reshape(len(rows), count)
 
 
 def _numbers(row: list[str], count: int, file: Path, line: int) -> list[float]:
@@ -354,7 +367,8 @@ def _demanded(path: Path, why: str) -> str:
         raise BaselineError(f"{path} is missing: {why}. {_AGAIN}") from error
     except (OSError, UnicodeDecodeError) as error:
         raise BaselineError(f"{path} cannot be read: {error}. {_AGAIN}") from error
-    for number, line in enumerate(text.splitlines(), 1):
+    marked = any(marker in text for marker in MARKERS)
+    for number, line in enumerate(text.splitlines() if marked else (), 1):
         if line.startswith(MARKERS[::2]) or line == MARKERS[1]:
             raise BaselineError(
                 f"{path}, line {number}: holds the conflict of a merge ({line[:7]}). Decide it, or make it again."

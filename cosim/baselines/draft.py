@@ -21,6 +21,7 @@ from cosim.baselines.baseline import Header
 from cosim.baselines.header_data import VERSION
 from cosim.baselines.model_identity import identities
 from cosim.baselines.recipe import Recipe
+from cosim.baselines.table_text import rows_text
 from cosim.comparison.compare import curve_of
 from cosim.comparison.event_comparison import TIMES, telegram_limits
 from cosim.comparison.tolerance import Tolerance, Tolerances
@@ -35,8 +36,6 @@ _EVENT_DIGITS = 12
 
 _SHARE = 1e-3
 """The last digit kept, as a share of the difference allowed: rounding takes at most half of it from the tolerance."""
-LARGE = 1e16
-"""Size from which numbers are written in full: beyond it float64 knows no digits behind the point."""
 _MOST = 15
 """Digits behind the point beyond which rounding gains nothing: numbers are then written in full."""
 
@@ -136,53 +135,6 @@ def _decimals_for(allowed: float) -> int | None:
         return None
     digits = -floor(log10(allowed * _SHARE))
     return digits if digits <= _MOST else None
-
-
-def number_text(value: float, decimals: int | None) -> str:
-    """A number as text.
-
-    Args:
-        value: the number; NaN and infinities become ``nan``, ``inf`` and ``-inf``.
-        decimals: as from `_decimals_for`; None for the shortest text that reads back as the same number.
-    """
-    full = repr(float(value)).removesuffix(".0")
-    if decimals is None or not isfinite(value) or abs(value) >= LARGE:
-        return full
-    short = f"{value:.{decimals}f}".rstrip("0").rstrip(".") if decimals > 0 else f"{round(value, decimals):.0f}"
-    return "0" if short in ("-0", "") else short
-
-
-def _column_text(values: Iterable[float], decimals: int | None) -> list[str]:
-    """A column of numbers as text, see `number_text`."""
-    return [number_text(value, decimals) for value in values]
-
-
-def time_text(times: list[float], decimals: int | None) -> list[str]:
-    """Instants as text. Those that rounding would make equal or put out of order are written in full.
-
-    Rows with the same time are the two sides of an event: rounding must make none and lose none.
-
-    Args:
-        times: of the rows [s], not decreasing. decimals: as from `_decimals_for`.
-    """
-    texts = _column_text(times, decimals)
-    for row in range(1, len(times)):
-        if times[row] != times[row - 1] and not float(texts[row]) > float(texts[row - 1]):
-            for near in (row - 1, row):
-                texts[near] = _equal_instant(times, texts, near)
-    return texts
-
-
-def _equal_instant(times: list[float], texts: list[str], row: int) -> str:
-    """The full text of a row's time, given to the rows with the same time as well."""
-    full = number_text(times[row], None)
-    first = row
-    while first > 0 and times[first - 1] == times[row]:
-        first -= 1
-    while first < len(times) and times[first] == times[row]:
-        texts[first] = full
-        first += 1
-    return full
 
 
 @dataclass(frozen=True)
@@ -286,15 +238,13 @@ def versions_of(result: Result) -> dict[str, str]:
 def _table_text(result: Result, rows: np.ndarray, tolerances: Tolerances) -> str:
     length = float(result.time[-1] - result.time[0])
     entries = [tolerances.default, *tolerances.by_signal.values()]
-    decimals = _decimals_for(min(entry.time_for(length) for entry in entries))
-    columns = [time_text(result.time[rows].tolist(), decimals)]
+    by_column, columns = [_decimals_for(min(entry.time_for(length) for entry in entries))], [result.time[rows]]
     for info in result.signals:
-        decimals = _decimals_for(tolerances.value_for(info.name, curve_of(result, info.name)))
-        columns.append(_column_text(result.table[info.name][rows].tolist(), decimals))
-    lines = io.StringIO()
-    csv.writer(lines, lineterminator="\n").writerow(["time", *(info.name for info in result.signals)])
-    lines.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
-    return lines.getvalue()
+        by_column.append(_decimals_for(tolerances.value_for(info.name, curve_of(result, info.name))))
+        columns.append(result.table[info.name][rows])
+    heading = io.StringIO()
+    csv.writer(heading, lineterminator="\n").writerow(["time", *(info.name for info in result.signals)])
+    return heading.getvalue() + rows_text(columns, by_column)
 
 
 def _events_text(result: Result, tolerance: Tolerance) -> str:

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from cosim.baselines.baseline import Baseline
-from cosim.baselines.draft import number_text
 from cosim.baselines.header_data import header_data
 from cosim.baselines.references.manifest import (
     CSV,
@@ -32,6 +31,7 @@ from cosim.baselines.references.manifest import (
     manifest_text,
     prefix,
 )
+from cosim.baselines.table_text import number_text
 from cosim.components.component import Component
 from cosim.components.loading import describe_fmu
 from cosim.components.stated_units import stated_units

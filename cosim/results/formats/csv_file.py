@@ -49,7 +49,7 @@ def write_csv(
         OSError: the file cannot be written.
     """
     names = column_names(table)
-    rows = _rows_as_text(len(table) * len(names))
+    rows = rows_as_text(len(table) * len(names))
     with Path(path).open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(headings or names)
     with Path(path).open("ab") as file:
@@ -58,9 +58,12 @@ def write_csv(
             file.write(rows(part.view(np.float64).reshape(len(part), len(names))))
 
 
-def _rows_as_text(count: int) -> Callable[[np.ndarray], bytes]:
+def rows_as_text(count: int) -> Callable[[np.ndarray], bytes]:
     """A function that writes rows, shape (rows, columns), as lines of text: compiled where `count` numbers are worth it
     and there is a compiler, else in Python, with the same bytes.
+
+    Args:
+        count: of numbers in all.
     """
     native = import_module("cosim.results.formats.csv_numbers").native_rows() if count >= MANY else None
     return native or _rows_in_python

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.baselines.draft import _decimals_for, number_text, time_text
+from cosim.baselines.draft import _decimals_for
+from cosim.baselines.table_text import Decimals, number_text, rows_text, time_text
 
 VALUES = st.floats(-1e9, 1e9)
 ALLOWED = st.floats(1e-12, 1e6)
@@ -62,3 +64,24 @@ def test_instants_stay_apart_and_together(steps: list[tuple[float, bool]], allow
     read = [float(text) for text in time_text(times, _decimals_for(allowed))]
     assert [b > a for a, b in pairwise(times)] == [b > a for a, b in pairwise(read)]
     assert all(b >= a for a, b in pairwise(read))
+
+
+ODD = st.sampled_from([math.nan, math.inf, -math.inf, -0.0, 0.5, 2.5, 1e-5, 123450.0, 1e15, 1e300])
+ROUND = st.integers(-(10**7), 10**7).map(lambda n: n / 2**6)  # ties of decimals
+NUMBERS = VALUES | ODD | ROUND | st.floats()
+DECIMALS = st.none() | st.integers(-20, 20)
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.0, 1.0), NUMBERS, NUMBERS), min_size=1, max_size=30), DECIMALS, DECIMALS, DECIMALS
+)
+def test_rows_at_once_are_rows_one_by_one(
+    rows: list[tuple[float, float, float]], time: Decimals, one: Decimals, two: Decimals
+) -> None:
+    """With Python's own rounding and words, number by number."""
+    steps, *signals = (np.array(column) for column in zip(*rows, strict=True))
+    instants = np.cumsum(np.where(steps < 0.2, 0.0, steps))  # some are equal
+    texts = [time_text(instants.tolist(), time)]
+    texts += [[number_text(v, digits) for v in s.tolist()] for s, digits in zip(signals, (one, two), strict=True)]
+    expected = "".join(",".join(cells) + "\n" for cells in zip(*texts, strict=True))
+    assert rows_text([instants, *signals], (time, one, two)) == expected
