@@ -82,12 +82,12 @@ def shifts(reference: Jumps, result: Jumps) -> np.ndarray:
     return np.where(together & (late | early), last, np.where(first * last > 0.0, smaller, 0.0))
 
 
-def choose(jumps: Jumps, which: np.ndarray) -> Jumps:
+def choose(jumps: Jumps, which: np.ndarray | slice) -> Jumps:
     """Some of the jumps.
 
     Args:
         jumps: all of them.
-        which: indices of those to take, shape (n,).
+        which: indices of those to take, shape (n,), or a slice.
     """
     return Jumps(*(getattr(jumps, field.name)[which] for field in fields(Jumps)))
 

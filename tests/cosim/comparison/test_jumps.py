@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_results import compared, kinds, made, signal
 
+from cosim.comparison.alignment import _UNMATCHED, match_jumps
 from cosim.comparison.curve import Curve, is_held
 from cosim.comparison.jumps import Jumps, find_jumps, shifts
-from cosim.comparison.points import UNMATCHED, _match_jumps
 from cosim.comparison.tolerance import Tolerance
 
 TIME = np.arange(201) * 0.01
@@ -92,14 +92,14 @@ def test_alignment_is_the_cheapest_one(a: Jumps, b: Jumps, window: float) -> Non
     """Against the plain recursion without a band; equal jumps at both ends are paired first, which costs nothing."""
     n, m = len(a), len(b)
     cost = np.array([[naive_cost(a, i, b, j, window, 0.5, 2.0) for j in range(m)] for i in range(n)]).reshape(n, m)
-    best = UNMATCHED * (np.arange(n + 1)[:, None] + np.arange(m + 1.0))
+    best = _UNMATCHED * (np.arange(n + 1)[:, None] + np.arange(m + 1.0))
     for i in range(n):
         for j in range(m):
-            best[i + 1, j + 1] = min(best[i, j + 1] + UNMATCHED, best[i + 1, j] + UNMATCHED, best[i, j] + cost[i, j])
-    first, second = _match_jumps(a, b, window=window, allowed=0.5, scale=2.0)
+            best[i + 1, j + 1] = min(best[i, j + 1] + _UNMATCHED, best[i + 1, j] + _UNMATCHED, best[i, j] + cost[i, j])
+    first, second = match_jumps(a, b, window=window, allowed=0.5, scale=2.0)
     assert np.all(np.diff(first) > 0)
     assert np.all(np.diff(second) > 0)
-    found = cost[first, second].sum() + UNMATCHED * (n + m - 2 * len(first))
+    found = cost[first, second].sum() + _UNMATCHED * (n + m - 2 * len(first))
     assert found == pytest.approx(best[n, m], abs=1e-9)  # sums of at most twenty costs
 
 
