@@ -23,6 +23,7 @@ from fmus.fmi.standard import fmi_version
 from plant_models.code_trust import WHY_NOT, is_looking, remember
 from plant_models.disk_cache.files import file_digest
 from plant_models.left_behind import owned
+from plant_models.user_file import CodeNotRunError
 
 VERSIONS = ("1.0", "2.0", "3.0")
 KEPT = 16
@@ -88,7 +89,8 @@ def unpack(archive: Archive) -> Path:
         FmuLoadError: nothing is run, see `plant_models.code_trust.looking`.
     """
     if is_looking():
-        raise FmuLoadError(f"The library of {archive.path} {WHY_NOT}.")
+        text = f"The library of {archive.path} {WHY_NOT}."
+        raise FmuLoadError(text) from CodeNotRunError(text)
     digest = _digest(archive.path)
     remember([archive.path])
     content = None if digest is None else _contents.get(digest)

@@ -57,7 +57,7 @@ def code_component(name: str, table: ComponentTable, links: Iterable[Link], wher
     Raises:
         CosimError: what the texts say of it contradicts itself.
     """
-    model = table.model or table.observer or table.filter
+    model = table.model or table.observer or f"a filter over {table.fmu}"
     ports = _declared(str(model), table)
     for text, port in _connected(name, links):
         known = set(ports["inputs"]) | set(ports["outputs"])
@@ -114,6 +114,8 @@ def _declared(model: str, table: ComponentTable) -> dict[str, Any]:
     of balises; nothing where it is not found, or computes its declarations.
     """
     found: dict[str, Any] = {port: {} for port in _PORTS}
+    if table.filter is not None and table.filter.balise is not None:
+        found[_BALISE] = _balise
     if not names_a_file(model):
         return found
     text, wanted = split_name(model)
