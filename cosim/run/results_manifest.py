@@ -5,16 +5,65 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
 
 from cosim.errors import ProvenanceError
 from fmus.near_files import near_files
 
 MADE_FROM, MANIFEST, SCENARIO, FILES = "made_from", "manifest.json", "scenario.toml", "files"
 FORMAT = 1
+
+
+@dataclass(frozen=True)
+class _Digest:
+    sha256: str
+
+
+@dataclass(frozen=True)
+class _Named(_Digest):
+    name: str
+
+
+@dataclass(frozen=True)
+class _Component:
+    name: str
+    model: str | None
+    guid: str | None
+
+
+@dataclass(frozen=True)
+class _KeptPart:
+    path: str
+    copy: str | None
+    sha256: str | None
+    why: str | None
+
+
+@dataclass(frozen=True)
+class _KeptFile:
+    key: str
+    path: str
+    parts: list[_KeptPart]
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What is relied on of the file; there may be more."""
+
+    scenario: _Named
+    versions: dict[str, str]
+    files: list[_KeptFile]
+    results: dict[str, _Digest]
+    components: list[_Component] = field(default_factory=list)
+    objects: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+
+_SHAPE = TypeAdapter(_Shape)
 
 
 @dataclass(frozen=True)
@@ -118,8 +167,12 @@ def read_manifest(directory: str | Path) -> Manifest:
             raise ProvenanceError(
                 f"{file} has format {known}, this version reads format {FORMAT}; use a newer fmu-observer."
             )
-        for key in ("scenario", "versions", "files", "results"):
-            data[key]
+        _SHAPE.validate_python(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        what = f"'{place}' is missing" if first["type"] == "missing" else f"{place}: {first['msg']}"
+        raise ProvenanceError(f"{file} cannot be read: {what}; another program wrote it, or it was edited.") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         if isinstance(error, ProvenanceError):
             raise
