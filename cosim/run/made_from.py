@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from importlib.machinery import all_suffixes
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from cosim.scenario.paths import map_paths
 from cosim.scenario.toml_values import plain
 from fmus.tables.plain_data import jsonable
 from fmus.versions import versions
+from plant_models.code_trust import remember
 from plant_models.hybrid.noise import RUN_SEED
 from plant_models.left_behind import owned
 from plant_models.user_file import names_code
@@ -89,6 +91,7 @@ def _prepare(origin: Origin, new: Path, files_up_to: float) -> dict[str, Any]:
         data, lambda path: copies.get(str((origin.folder / path).resolve()), str((origin.folder / path).resolve()))
     )
     (new / SCENARIO).write_text(HEADER + tomli_w.dumps(data), encoding="utf-8")
+    remember(file for file in new.rglob("*") if file.name.endswith(tuple(all_suffixes())))  # it has just run here
     return {
         "format": FORMAT,
         "scenario": {"name": origin.name, "from": origin.where, "file": SCENARIO, "sha256": sha256(new / SCENARIO)},

@@ -35,6 +35,7 @@ def made(folder: Path, kind: str) -> subprocess.Popen[str]:
         process.stdin.close()  # type: ignore[union-attr] # and nobody asks how it ended: a zombie is no owner
         process.stdout.read()
         process.stdout.close()
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)  # its files close before it is a zombie
     return process
 
 

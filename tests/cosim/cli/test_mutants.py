@@ -16,8 +16,8 @@ from pathlib import Path
 from random import Random
 
 import pytest
+from damaged_files import change_archive, change_file, change_folder, copied
 from kept_runs import coast
-from mutants import change_archive, change_file, change_folder, copied
 from ssp_files import connector, package, ssd
 
 from cosim.cli import main
