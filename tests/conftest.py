@@ -53,7 +53,7 @@ SHARED: dict[int, float] = {}
 """Processor time of each fixture that tests share [s]: the first of them pays for it."""
 SEED = "FMU_OBSERVER_TEST_SAMPLE"
 """Variable of the environment: what draws the sample; the digest of the product unless it is set."""
-OF_FIRST, OF_SECOND, OF_UNCHANGED = 16, 4, 16
+OF_FIRST, OF_SECOND, OF_UNCHANGED = 16, 6, 16
 """One in so many is in the sample: of the tests of the first tier; of the cases of a law of the second; of pages and
 sheets that follow from nothing that changed."""
 
