@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 from cosim import studies
@@ -125,6 +126,8 @@ def execute(options: argparse.Namespace) -> Output:
     except OutputError as error:  # what the disk did not take is at least on the screen
         if results.outcome is None:
             raise
+        if not left_rows(directory) and (place := _elsewhere(results.outcome)) is not None:
+            error = OutputError(f"{error} What was computed stands in {place} instead.")
         return replace(_output(results.outcome, None, {}, options), error=error)
     assert results.outcome is not None
     outcome, paths = results.outcome, results.paths
@@ -212,6 +215,17 @@ def _kept(results: _Results, streamed: bool, formats: Sequence[str]) -> Iterator
         if results.paths:
             shutil.rmtree(directory / UNFINISHED, ignore_errors=True)
         LAST_CALL.note("")
+
+
+def _elsewhere(outcome: Outcome) -> Path | None:
+    """A folder for temporary files with the results that the disk of the other one did not take; None if it neither."""
+    folder = Path(mkdtemp(prefix="cosim_results_"))
+    try:
+        outcome.write(folder, report=False)
+    except OutputError:
+        shutil.rmtree(folder, ignore_errors=True)
+        return None
+    return folder
 
 
 def _call_log(options: argparse.Namespace, scenario: Scenario, directory: Path) -> Path | None:

@@ -12,6 +12,7 @@ import csv
 import io
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -181,6 +182,9 @@ class _StreamFile(RowFile):
         """As for any file of rows."""
         if self._broken is not None:
             raise self._explained(self._broken) from self._broken
+        if not self._reserved:  # with its header the file is a table, of no row if there is no space for any
+            with suppress(OSError):
+                self._file.write(growing_header(self._dtype, 0))
         super().reserve(rows)
 
     def write(self, first: int, rows: np.ndarray) -> None:
@@ -223,6 +227,7 @@ class _StreamFile(RowFile):
 
     def _explained(self, error: OSError) -> OutputError:
         return OutputError(
-            f"The run cannot be streamed to {self._folder} any further: {error.strerror or error}. What was recorded "
-            "so far is kept. Free the disk, choose another folder, or record less (record_every)."
+            f"The run cannot be streamed to {self._folder} any further: {error.strerror or error}. "
+            f"{f'The {self.count} rows up to there are kept' if self.count else 'No row was recorded'}. "
+            "Free the disk, choose another folder, or record less (record_every)."
         )

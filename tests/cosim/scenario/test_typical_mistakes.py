@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import errno
 import json
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from cosim.cli import main
+from cosim.results import results_folder
+from cosim.results.load_result import load_result
 
 GOOD = """\
 title = "Own train"
@@ -233,3 +237,26 @@ def test_a_full_disk_is_one_line_and_what_was_computed_is_shown(
     shown = capsys.readouterr()
     assert "0.5 s simulated" in shown.out
     assert "No space left on device" in shown.err.splitlines()[-1]
+
+
+def test_what_a_full_disk_does_not_take_stands_in_a_temporary_folder(
+    in_folder: Path,
+    tmp_path_factory: pytest.TempPathFactory,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    write = results_folder._write_all
+
+    def full(result: Any, folder: Path, formats: Any) -> Any:
+        if folder.is_relative_to(in_folder):
+            raise OSError(errno.ENOSPC, "No space left on device", "table.csv")
+        return write(result, folder, formats)
+
+    (in_folder / "own.toml").write_text(GOOD, encoding="utf-8")
+    monkeypatch.setattr(results_folder, "_write_all", full)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path_factory.mktemp("elsewhere")))
+    assert main(["run", "own.toml", "--quiet", "--no-report"]) == 2
+    words = capsys.readouterr().err.splitlines()[-1]
+    place = re.search(r"What was computed stands in (\S+) instead\.", words)
+    assert place is not None
+    assert load_result(place[1]).time[-1] == 0.5
