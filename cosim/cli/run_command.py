@@ -32,7 +32,7 @@ from cosim.run.outcome import Outcome
 from cosim.simulation.scenario import Scenario
 from cosim.studies.warnings_of_runs import PAGE, warning_lines
 from fmus.cli.colour import Role
-from fmus.cli.commands import argument
+from fmus.cli.commands import Argument, argument
 from fmus.cli.output import Output
 from fmus.cli.progress import ProgressBar
 from fmus.tables.table import Table
@@ -63,24 +63,22 @@ PARSER = {
         "not begin."
     ),
 }
+
+
+def _setting(option: str, key: str, metavar: str, text: str) -> Argument:
+    """An option that stands for ``--set KEY=``."""
+    return argument(option, action="append", type=f"{key}={{}}".format, dest="settings", metavar=metavar, help=text)
+
+
 ARGUMENTS = (
     *scenario_arguments(),
     argument("--out", metavar="DIR", default=None, help="folder for results and report (default: results/NAME)"),
-    argument(
-        "--seed",
-        action="append",
-        type="seed={}".format,
-        dest="settings",
-        metavar="N",
-        help="seed of the run: all chance",
-    ),
-    argument(
+    _setting("--seed", "seed", "N", "seed of the run: all chance"),
+    _setting(
         "--isolate",
-        action="append",
-        type="master.isolate={}".format,
-        dest="settings",
-        metavar="WHAT",
-        help="component: each FMU by path gets a process of its own, which a crash takes along; no: none does",
+        "master.isolate",
+        "WHAT",
+        "component: each FMU by path gets a process of its own, which a crash takes along; no: none does",
     ),
     argument(
         "--seeds",

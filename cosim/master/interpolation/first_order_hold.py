@@ -121,7 +121,9 @@ class FirstOrderHold:
         if self.method == "interpolate":
             usable &= history.later_at >= until - TIME_TOLERANCE
         span = np.where(usable, history.later_at - history.earlier_at, 1.0)
-        self.slope = np.where(usable, (history.later - history.earlier) / span, 0.0)
+        with np.errstate(over="ignore"):  # where no number holds the slope, the last value is held
+            slope = (history.later - history.earlier) / span
+        self.slope = np.where(usable & np.isfinite(slope), slope, 0.0)
 
     def at(self, time: float, *, begins: bool = False) -> np.ndarray:
         """Values of the inputs at a time [s], shape (m,).

@@ -154,6 +154,15 @@ def test_no_line_leads_over_a_jump_and_saved_lines_come_back() -> None:
     assert hold.at(0.3)[0] == pytest.approx(4.0)
 
 
+def test_where_no_number_holds_the_slope_the_value_is_held() -> None:
+    source = component(Counter(), "source")
+    hold = FirstOrderHold("extrapolate", [source], np.array([True]))
+    for t, value in ((0.0, -1e308), (0.1, 1e308)):
+        source.time = t
+        hold.update(np.array([value]), t + 0.1)
+    assert hold.at(0.2)[0] == 1e308
+
+
 def test_discrete_inputs_are_held() -> None:
     hold = FirstOrderHold("extrapolate", [component(Counter(), "source")] * 2, np.array([True, False]))
     for t in (0.0, 0.1):
