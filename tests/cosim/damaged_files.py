@@ -52,7 +52,7 @@ ENTITY = (
     b'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;"><!ENTITY c SYSTEM "file:///etc/passwd">]>'
 )
 
-OUTSIDE = ("../escaped", "/tmp/escaped", "a\\..\\..\\escaped", "x" * 300, "con")
+OUTSIDE = ("../escaped", "/escaped", "a\\..\\..\\escaped", "x" * 300, "con")
 
 Change = Callable[[bytes, Random], bytes]
 
@@ -173,9 +173,7 @@ def change_archive(path: Path, chance: Random, suffixes: tuple[str, ...]) -> Non
     if kind < 0.22:
         del members[chance.choice(list(members))]
     elif kind < 0.3:
-        members[chance.choice(("../escaped", "/tmp/escaped", "a\\..\\..\\escaped", "x" * 300, "con"))] = members.pop(
-            name
-        )
+        members[chance.choice(("../escaped", "/escaped", "a\\..\\..\\escaped", "x" * 300, "con"))] = members.pop(name)
     else:
         members[name] = mutant(members[name], Path(name).suffix, chance)
     with zipfile.ZipFile(path, "w") as archive:
