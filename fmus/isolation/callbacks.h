@@ -9,7 +9,6 @@ static char *requests, *replies, *messages;
 static void *library, *instance, *addresses[FUNCTION_COUNT];
 static pthread_t here;
 static pthread_mutex_t writing = PTHREAD_MUTEX_INITIALIZER;
-static Patience patience;
 static uint32_t answered;
 
 typedef int64_t (*Uniform)(uint64_t, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t, uint64_t,

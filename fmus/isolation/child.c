@@ -4,7 +4,7 @@
    there is too much of it, and says in memory that the FMU cannot write how the process ended.
 
    Arguments: library, its folder, modelIdentifier, process that asked, most processes, most memory [bytes], most open files, most
-   bytes of a file, looks before sleeping. The shared memory is descriptor 3.
+   bytes of a file. The shared memory is descriptor 3.
  */
 #include "callbacks.h"
 
@@ -134,7 +134,7 @@ static void perform_all(const Record *r) {
 static const Record *serve(void) {
     for (;;) {
         const uint32_t next = answered + 1;
-        for (bool came = comes_soon(&patience, &asking->number, next); !came;) {
+        for (bool came = comes_soon(&asking->number, next, asking->looks); !came;) {
             atomic_store(&answering->sleeps, 1);
             const uint32_t seen = atomic_load(&asking->number);
             came = seen == next;
@@ -208,7 +208,6 @@ static void run_fmu(char **words, pid_t supervisor) {
     replies = written + PAGE;
     messages = replies + AREA_BYTES;
     here = pthread_self();
-    set_patience(&patience, atol(words[LOOKS]));
     limit(RLIMIT_CORE, "0");
     limit(RLIMIT_NOFILE, words[FILES]);
     limit(RLIMIT_FSIZE, words[FILE_SIZE]);
@@ -250,6 +249,7 @@ int main(int count, char **words) {
         say_end(said, watched, EXITED, 1, 0);
         return 1;
     }
+    said->child = child;
     close(MEMORY_FILE);
     for (int k = 0; k < 3; k++)
         close(k);

@@ -19,6 +19,8 @@ from fmus.isolation.programs import isolation_programs
 _PATH_BYTES = 4096
 _INPUTS = 8
 _numbers = itertools.count(1)
+_running = ctypes.c_long(0)
+"""Processes of isolated FMUs that this one has: the proxies, of which each FMU has its own, count here."""
 
 
 class _Options(ctypes.Structure):
@@ -27,8 +29,9 @@ class _Options(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_char * _PATH_BYTES) for name in ("program", "library", "folder")),
         ("identifier", ctypes.c_char * 256),
-        *((name, ctypes.c_long) for name in ("processes", "memory", "files", "file_bytes", "output_bytes", "looks")),
+        *((name, ctypes.c_long) for name in ("processes", "memory", "files", "file_bytes", "output_bytes")),
         ("limit", ctypes.c_void_p),
+        ("running", ctypes.c_void_p),
     )
 
 
@@ -123,7 +126,7 @@ def load_isolated(
     )
     for key, most in vars(isolation).items():
         setattr(options, key, most)
-    options.limit = call_limit
+    options.limit, options.running = call_limit, ctypes.addressof(_running)
     names = _real_names(description)
     return load(
         folder,

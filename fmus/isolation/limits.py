@@ -13,7 +13,6 @@ class OwnProcess:
         processes: that it may have running beside it. memory: of all of them [bytes].
         files: open at a time in each. file_bytes: of one file. output_bytes: printed between two calls past its logger;
             what is beyond is lost.
-        looks: how often is looked for an answer before sleeping; -1 for as often as has paid off lately.
     """
 
     processes: int = 32
@@ -21,4 +20,3 @@ class OwnProcess:
     files: int = 1024
     file_bytes: int = 1024**3
     output_bytes: int = 64 * 1024
-    looks: int = -1

@@ -57,8 +57,10 @@ static int64_t finish(Session *s, const Function *f, const Record *r, const uint
 
 static void note_phase(Session *s, const Function *f, int64_t said) {
     const bool well = said <= WARNING_STATUS;
-    if (f->part == STARTED && well)
+    if (f->part == STARTED && well) {
         s->running = true;
+        begin_pace(&s->pace);
+    }
     if (f->part == ENDED)
         s->running = false;
     s->clean = (s->clean && f->part == GET) || (f->part == STEP && well && s->running && s->depth == 0);

@@ -192,6 +192,8 @@ static void add_mark(Session *s, uint32_t function) {
 
 static void send_request(Session *s, size_t first) {
     s->asking->first = (uint32_t)first;
+    s->asking->looks = s->pace.place == THIS_CORE ? 0 : LOOKS;
+    put_in_place(&s->pace, s->supervision->child);
     s->number++;
     post(&s->asking->number, s->number, &s->answering->sleeps);
 }
@@ -226,13 +228,19 @@ static void answer_callback(Session *s) {
 /* Have the request made. False where the process ended. */
 static bool exchange(Session *s) {
     const size_t base = s->base, first = s->base;
+    const bool paced = s->running && s->depth == 0;
+    if (paced)
+        begin_call(&s->pace);
     add_mark(s, N_STOP);
     send_request(s, first);
     const uint32_t sent = s->number;
     while (!s->dead && await(s)) {
         s->sent = sent;
-        if (s->answering->kind == REPLY)
+        if (s->answering->kind == REPLY) {
+            if (paced)
+                end_call(&s->pace);
             return true;
+        }
         const size_t used = s->used, replies = s->reply_used;
         s->base = used;
         s->depth++;

@@ -1,7 +1,7 @@
 /* One instance of an FMU in a process of its own, as the proxy sees it: how its process is started, waited for and ended, and what is
    known of its end. Part of `proxy.c`.
  */
-#include "shared.h"
+#include "pacing.h"
 
 #include <spawn.h>
 
@@ -16,8 +16,9 @@ extern char **environ;
 
 typedef struct {
     char program[PATH_MAX], library[PATH_MAX], folder[PATH_MAX], identifier[256];
-    long processes, memory, files, file_bytes, output_bytes, looks;
-    const double *limit; /* longest time of a call [s]; 0 for any */
+    long processes, memory, files, file_bytes, output_bytes;
+    const double *limit;   /* longest time of a call [s]; 0 for any */
+    _Atomic long *running; /* processes like this one that the program has */
 } Options;
 
 typedef struct { /* a get that is made ahead, right behind the step */
@@ -36,7 +37,7 @@ typedef struct Session {
     pid_t supervisor, owner;
     int console;
     uint32_t number;
-    Patience patience;
+    Pace pace;
     size_t base, used, reply_used; /* where the request under way begins, ends, and its replies end */
     int waiting;                   /* sets in it that wait for the next call */
     int depth;                     /* callbacks that are being answered */
@@ -166,7 +167,7 @@ static void note_overdue(Session *s) {
 
 /* Wait for what the process says next. False where it has ended, or took too long and was ended. */
 static bool await(Session *s) {
-    if (comes_soon(&s->patience, &s->answering->number, s->number))
+    if (came_at_once(&s->pace, &s->answering->number, s->number))
         return true;
     const double until = now() + patience_seconds();
     for (;;) {
@@ -211,11 +212,11 @@ static void map(Session *s, int memory) {
 }
 
 static int spawn(Session *s, int memory) {
-    char words[6][24];
-    const long numbers[6] = {getpid(), options.processes, options.memory, options.files, options.file_bytes, options.looks};
-    for (int k = 0; k < 6; k++)
+    char words[5][24];
+    const long numbers[5] = {getpid(), options.processes, options.memory, options.files, options.file_bytes};
+    for (int k = 0; k < 5; k++)
         snprintf(words[k], sizeof words[k], "%ld", numbers[k]);
-    char *arguments[] = {options.program, options.library, options.folder, options.identifier, words[0], words[1], words[2], words[3], words[4], words[5], NULL};
+    char *arguments[] = {options.program, options.library, options.folder, options.identifier, words[0], words[1], words[2], words[3], words[4], NULL};
     posix_spawn_file_actions_t files;
     posix_spawnattr_t attributes;
     sigset_t none, all;
@@ -265,17 +266,18 @@ static void close_session(Session *s) {
         close(s->console);
     free(s->texts);
     free(s);
+    atomic_fetch_sub(options.running, 1);
 }
 
 /* A process that has loaded the FMU; NULL, with the reason, where there is none. */
 static Session *open_session(void) {
     Session *s = calloc(1, sizeof *s);
+    atomic_fetch_add(options.running, 1);
     s->owner = getpid();
     s->free = true;
     s->outside = "loading its library";
     s->next = sessions;
     sessions = s;
-    set_patience(&s->patience, options.looks);
     const int memory = memory_file("fmu", FILE_BYTES);
     s->console = memory_file("fmu-console", options.output_bytes);
     if (memory >= 0)
@@ -287,6 +289,7 @@ static Session *open_session(void) {
     }
     if (memory >= 0)
         close(memory);
+    set_pace(&s->pace, options.running);
     s->number = 1;
     s->base = s->used = s->reply_used = AHEAD_BYTES;
     if (s->supervisor == 0)

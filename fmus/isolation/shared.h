@@ -61,6 +61,7 @@ typedef struct {
     _Atomic uint32_t ended;
     int32_t code; /* exit code or signal */
     int32_t left; /* processes that it had started and left running */
+    int32_t child; /* the process; 0 where it is not known */
 } Supervision;
 
 #define OWN_LINE _Alignas(64) /* of the cache: what one writes often does not delay who looks at what is beside it */
@@ -70,6 +71,7 @@ typedef struct { /* written by the proxy */
     uint32_t first; /* where the request begins */
     uint32_t ahead; /* where the gets end that are made behind a step, from the beginning of the requests on */
     uint32_t wanted; /* whether some are to be made behind this one */
+    int32_t looks; /* for the next request, before sleeping */
     OWN_LINE uint64_t log_taken; /* messages up to here have been taken */
 } Asking;
 
@@ -148,39 +150,14 @@ static inline void post(_Atomic uint32_t *word, uint32_t number, _Atomic uint32_
         wake(word);
 }
 
-/* How long to look for an answer before sleeping, in looks: a few times as long as it took lately. Where that did not pay off, it is left
-   out for a while, which doubles each time: who is waited for may need this very core. */
-typedef struct {
-    int most, usual;
-    unsigned left_out, leave_out;
-} Patience;
+#define LOOKS 1500 /* some 50 microseconds: as long as it takes to wake somebody on another core */
 
-#define LOOKS_AT_MOST 1500 /* some 50 microseconds */
-#define LEFT_OUT_AT_MOST 127
-
-static inline void set_patience(Patience *p, long asked) {
-    cpu_set_t cores;
-    CPU_ZERO(&cores);
-    const bool alone = sched_getaffinity(0, sizeof cores, &cores) == 0 && CPU_COUNT(&cores) < 2;
-    *p = (Patience){.most = asked >= 0 ? (int)asked : alone ? 0 : LOOKS_AT_MOST};
-}
-
-static inline bool comes_soon(Patience *p, _Atomic uint32_t *word, uint32_t number) {
-    const int looks = 3 * p->usual + 100 < p->most ? 3 * p->usual + 100 : p->most;
-    if (p->left_out > 0) {
-        p->left_out--;
-        return atomic_load_explicit(word, memory_order_acquire) == number;
-    }
+/* Whether a message comes while one looks for it. */
+static inline bool comes_soon(_Atomic uint32_t *word, uint32_t number, int looks) {
     for (int k = 0; k <= looks; k++) {
-        if (atomic_load_explicit(word, memory_order_acquire) == number) {
-            p->usual += (k - p->usual) / 4;
-            p->leave_out /= 2;
+        if (atomic_load_explicit(word, memory_order_acquire) == number)
             return true;
-        }
         rest();
     }
-    p->usual = 2 * p->usual + 16 < p->most ? 2 * p->usual + 16 : p->most;
-    p->leave_out = 2 * p->leave_out + 1 < LEFT_OUT_AT_MOST ? 2 * p->leave_out + 1 : LEFT_OUT_AT_MOST;
-    p->left_out = p->leave_out;
     return false;
 }

@@ -1,7 +1,7 @@
 /* The supervisor of an isolated FMU: it ends all that the FMU started. Part of `child.c`. */
 #include "shared.h"
 
-enum { LIBRARY = 1, FOLDER, IDENTIFIER, PARENT, PROCESSES, MEMORY, FILES, FILE_SIZE, LOOKS, ARGUMENT_COUNT };
+enum { LIBRARY = 1, FOLDER, IDENTIFIER, PARENT, PROCESSES, MEMORY, FILES, FILE_SIZE, ARGUMENT_COUNT };
 enum { MEMORY_FILE = 3, MOST_LISTED = 4096 };
 #define LOOK_EVERY 100000000L /* of the supervisor [ns] */
 #define LAST_SECONDS 5.0
@@ -76,6 +76,7 @@ static int end_all(pid_t child) {
 
 static void say_end(Supervision *said, Answering *answering, uint32_t ended, int code, int left) {
     said->code = code;
+    said->child = 0;
     said->left = left;
     atomic_store(&said->ended, ended);
     atomic_fetch_xor(&answering->number, 1u << 30); /* nobody sleeps on a number that stays */

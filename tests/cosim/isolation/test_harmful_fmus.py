@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -72,6 +73,27 @@ def _open_files() -> list[str]:
     return sorted(found)
 
 
+def cores_of_fmus() -> list[int]:
+    """How many cores each process may use that has an FMU or watches one."""
+    return sorted(len(os.sched_getaffinity(int(number))) for number in processes_of_fmus())
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="there is one core")
+def test_fmus_take_turns_on_one_core_where_there_are_more_than_cores_to_spare(
+    fmus: dict[int, Path],
+) -> None:
+    spare = len(os.sched_getaffinity(0)) - 1
+    components = [load_fmu(fmus[2], f"part{k}", isolation=SMALL) for k in range(spare + 1)]
+    loaded = cores_of_fmus()
+    for component in components:
+        lived(component)
+    assert loaded == [spare + 1] * len(loaded)  # none has been stepped
+    assert cores_of_fmus() == [1] * (spare + 1) + [spare + 1] * (spare + 1)  # who watches is free
+    for component in components:
+        component.terminate()
+        component.free()
+
+
 def harm(monkeypatch: pytest.MonkeyPatch, deed: str, version: int, moment: str) -> None:
     monkeypatch.setenv("HARM", deed)
     monkeypatch.setenv("HARM_IN", CALLS[version][moment])
@@ -139,8 +161,9 @@ def test_what_ends_its_process_is_told(fmus: dict[int, Path], monkeypatch: pytes
     LAST_CALL.limit(LIMIT if "not returned" in DEADLY[deed] else 10.0)
     said = what_happened(fmus[2])
     assert DEADLY[deed] in said
-    assert "doStep failed" in said or deed == "parent"  # which it may outlive by a call
-    assert "the last inputs were u = 0" in said
+    if deed != "parent":  # which it may outlive by as many calls as the system takes to end it
+        assert "doStep failed" in said
+        assert "the last inputs were u = 0" in said
 
 
 @pytest.mark.parametrize("deed", SURVIVED)
