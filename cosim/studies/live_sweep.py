@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 
 from cosim.report.live.live_page import LivePage, Mood, PageCurve, PagePanel, PageRecording, PageVerdict, Rows, Section
 from cosim.results.results_folder import REPORT
+from cosim.statistics.sensitivity import rank_correlation
 from cosim.studies.measures import UNMET, is_number, setting_text
 from cosim.studies.setting_units import setting_unit
 from cosim.studies.warnings_of_runs import counted
@@ -219,7 +219,7 @@ def _correlations(result: SweepRuns, measure: str) -> list[tuple[str, float]]:
     for name in result.names if len(runs) >= _FEWEST else ():
         settings, values = [run.settings.get(name) for run in runs], [run.measures[measure] for run in runs]
         if all(map(is_number, settings)) and len(set(settings)) > 2 and len(set(values)) > 2:
-            found.append((name, float(scipy.stats.spearmanr(settings, values).statistic)))
+            found.append((name, rank_correlation(settings, values).value))
     return found
 
 

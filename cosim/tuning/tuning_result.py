@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.studies.groups import Spread, mean_of
+from cosim.statistics.intervals import mean_of
+from cosim.statistics.spread import Spread
 from fmus.tables.numbers import number
 from fmus.tables.table import Column, Parts, Readable, Table, name_column
 

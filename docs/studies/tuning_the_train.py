@@ -18,7 +18,7 @@ from typing import NamedTuple
 from page_tables import write_table
 
 from cosim import Scenario
-from cosim.studies.groups import mean_of
+from cosim.statistics.intervals import mean_of
 from cosim.studies.measures import error_measures
 
 PAGE = Path(__file__).parents[1] / "theses" / "tuning_the_train.md"

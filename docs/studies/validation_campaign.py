@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from cosim import Scenario
-from cosim.studies.groups import Spread, grouped
+from cosim.statistics.spread import Spread
+from cosim.studies.groups import grouped
 from fmus.tables.numbers import number
 
 PAGE = Path(__file__).parents[1] / "theses" / "validation_campaign.md"
@@ -96,8 +97,8 @@ def threshold_shares(
         values = {"case": list(cases), f"{OBSERVER}.threshold": [threshold], "seed": list(seeds)}
         found = grouped(Scenario.load("validation_campaign").vary(values).run(keep=False), "case")
         for case, spreads in found.items():
-            missed[case][k] = spreads[f"{OBSERVER}.missed_share"].mean
-            false[case][k] = spreads[f"{OBSERVER}.false_share"].mean
+            missed[case][k] = spreads[f"{OBSERVER}.missed_share"].value
+            false[case][k] = spreads[f"{OBSERVER}.false_share"].value
     return missed, false
 
 

@@ -43,9 +43,9 @@ def main() -> None:
     for k, (case, published) in enumerate(PUBLISHED.items()):
         for i, (measure, factor) in enumerate(COLUMNS.values()):
             spread, why = found[case][measure], MICRO if "micro" in case else REASONS[i]
-            if "micro" in case and np.isnan(spread.mean):
+            if "micro" in case and np.isnan(spread.value):
                 continue  # no micro-jam was found within its own time: there is no delay
-            sheet.add(f"{case}: {QUANTITIES[i]}", UNITS[i], published[i], factor * spread.mean, why)
+            sheet.add(f"{case}: {QUANTITIES[i]}", UNITS[i], published[i], factor * spread.value, why)
         for i, colour in ((4, "tab:orange"), (5, "tab:blue")):
             measure, factor = list(COLUMNS.values())[i]
             axis.bar(k + 0.4 * (i - 4.5), factor * found[case][measure].mean, 0.38, color=colour)

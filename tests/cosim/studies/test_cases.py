@@ -16,7 +16,8 @@ from cosim import Scenario
 from cosim.cli import main
 from cosim.errors import CosimError, ScenarioError
 from cosim.runs.journal import JOURNAL
-from cosim.studies.groups import grouped, groups_table, mean_of
+from cosim.statistics.intervals import mean_of
+from cosim.studies.groups import grouped, groups_table
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun
 
@@ -92,7 +93,7 @@ def test_groups_are_means_with_the_interval_of_student(swept: SweepResult) -> No
     ways = [run.measures["way"] for run in swept.runs[2:]]
     low, high = stats.t.interval(0.95, 1, loc=np.mean(ways), scale=stats.sem(ways))
     spread = found["heavy, long"]["way"]
-    assert (spread.mean, spread.low, spread.high, spread.count) == pytest.approx((np.mean(ways), low, high, 2))
+    assert (spread.value, spread.low, spread.high, spread.count) == pytest.approx((np.mean(ways), low, high, 2))
     assert "heavy, long     2" in groups_table(swept, "case").text()
     assert mean_of([nan, 3.0]).text() == "3.00"
     assert mean_of([nan]).text() == "–"
@@ -113,9 +114,9 @@ def test_shares_and_rates_are_of_all_that_was_counted() -> None:
     found = grouped(SweepResult(family(), ["case"], runs), "case")["a"]
     exact = stats.binomtest(9, 10).proportion_ci(0.95, "exact")
     share = found["o.missed_share"]
-    assert (share.mean, share.low, share.high) == pytest.approx((0.9, exact.low, exact.high))
+    assert (share.value, share.low, share.high) == pytest.approx((0.9, exact.low, exact.high))
     rate = found["o.false_alarms_per_hour"]
-    assert (rate.mean, rate.low, rate.high) == pytest.approx(
+    assert (rate.value, rate.low, rate.high) == pytest.approx(
         (1.0, stats.chi2.ppf(0.025, 2) / 2, stats.chi2.ppf(0.975, 4) / 2)
     )
 
