@@ -27,6 +27,7 @@ from cosim.errors import CosimError
 from cosim.master.axis import TimeAxis
 from cosim.master.interpolation.interpolators import MeanInterpolator
 from cosim.process.last_call import LAST_CALL
+from fmus.exchange.slave import solver_of
 from fmus.fmi.call_warnings import CONTRADICTIONS
 from fmus.fmi.elements import Element
 from fmus.fmi.ports import is_native
@@ -210,7 +211,7 @@ class Program:
         instance = self._instance(component)
         outputs = [s.name.removeprefix(f"{component.name}.") for s in self.plan.signals[step.columns]]
         made = CSlave(instance=instance, fmi_version=component.fmi_version)
-        made.do_step = self.function(component, f"fmi{component.fmi_version}DoStep")
+        made.do_step, made.stepped = self._called(component, f"fmi{component.fmi_version}DoStep")
         made.no_way_back, made.left_at = ctypes.addressof(component.no_way_back), ctypes.addressof(component.left_at)
         made.numbers = LAST_CALL.numbers(component.name)
         made.returns_early = component.capabilities.mightReturnEarlyFromDoStep
@@ -268,14 +269,21 @@ class Program:
         elements = [first[element.variable.name] + (element.index or 0) for _, element in members]
         port = CPort(reference_count=len(first), raw_count=total, count=len(members), kind=KINDS.index(word))
         port.raw_bytes = total * np.dtype(c_type(kind, version)[2]).itemsize
-        port.function, port.values = self.function(component, f"fmi{version}{verb}{kind}"), self.keep(values)
-        port.references = self.keep(np.array([component.variables[n].valueReference for n in first], dtype=np.uint32))
+        references = np.array([component.variables[n].valueReference for n in first], dtype=np.uint32)
+        port.references, port.values = self.keep(references), self.keep(values)
+        port.function, port.instance = self._called(component, f"fmi{version}{verb}{kind}", references.tobytes())
         if word == "Float64" and elements == list(range(total)) and places == list(range(places[0], places[0] + total)):
             port.raw = self.keep(values[places[0] :])
             return port
         port.places, port.elements = (self.keep(np.array(numbers, dtype=np.int64)) for numbers in (places, elements))
         port.raw = self.keep(np.zeros(total, dtype=c_type(kind, version)[2]))
         return port
+
+    def _called(self, component: Component, name: str, references: bytes = b"") -> tuple[int, int]:
+        """Address of a function, and what it takes in place of the instance."""
+        solver = solver_of(component.slave)
+        native = None if solver is None else solver.native(name, references)
+        return native or (self.function(component, name), self._instance(component))
 
     def function(self, component: Component, name: str) -> int:
         """Address of a function of the component's library.

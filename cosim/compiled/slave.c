@@ -45,22 +45,22 @@ typedef int (*DoStep3)(void *instance, double t, double h, bool no_set_state, bo
 static int transfer(const Slave *slave, const Port *port) {
     size_t count = (size_t)port->reference_count;
     if (slave->fmi_version == 3)
-        return ((Transfer3)port->function)(slave->instance, port->references, count, port->raw, (size_t)port->raw_count);
-    return ((Transfer12)port->function)(slave->instance, port->references, count, port->raw);
+        return ((Transfer3)port->function)(port->instance, port->references, count, port->raw, (size_t)port->raw_count);
+    return ((Transfer12)port->function)(port->instance, port->references, count, port->raw);
 }
 
 static bool called_step(Program *program, const Slave *slave, double t, double h) {
     if (slave->fmi_version == 1) {
-        program->status = ((DoStep1)slave->do_step)(slave->instance, t, h, 1);
+        program->status = ((DoStep1)slave->do_step)(slave->stepped, t, h, 1);
         return program->status <= STATUS_WARNING;
     }
     if (slave->fmi_version == 2) {
-        program->status = ((DoStep2)slave->do_step)(slave->instance, t, h, *slave->no_way_back != 0);
+        program->status = ((DoStep2)slave->do_step)(slave->stepped, t, h, *slave->no_way_back != 0);
         return program->status <= STATUS_WARNING;
     }
     bool event = false, terminate = false, early = false;
     double reached = t + h; /* for slaves that do not fill it in */
-    program->status = ((DoStep3)slave->do_step)(slave->instance, t, h, *slave->no_way_back != 0, &event, &terminate, &early, &reached);
+    program->status = ((DoStep3)slave->do_step)(slave->stepped, t, h, *slave->no_way_back != 0, &event, &terminate, &early, &reached);
     program->event = event;
     program->terminate = terminate;
     program->early = early;

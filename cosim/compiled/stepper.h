@@ -34,7 +34,7 @@ enum {
 
 /* One call that reads or writes all variables of one type. */
 typedef struct {
-    void *function;
+    void *function, *instance;
     const uint32_t *references; /* of whole variables */
     double *values;         /* outputs of the component, or its gathered inputs */
     void *raw;              /* what the function gets */
@@ -86,7 +86,7 @@ enum { BEYOND_STEP, EARLY_RETURN, EVENT_WITHOUT_MODE, CONTRADICTIONS };
 
 typedef struct {
     void *instance;
-    void *do_step;
+    void *do_step, *stepped;           /* and what it takes in place of the instance */
     int *no_way_back;                  /* nothing was saved so far: no step leads back before the begin of this one */
     double *left_at;                   /* FMI 3: where an early return just before its end left the last step [s], else infinite */
     Port *writes, *reads;

@@ -15,7 +15,8 @@ class CPort(ctypes.Structure):
     """`Port`."""
 
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("function", "references", "values", "raw", "places", "elements")),
+        *((name, ctypes.c_void_p) for name in ("function", "instance", "references", "values", "raw")),
+        *((name, ctypes.c_void_p) for name in ("places", "elements")),
         *((name, ctypes.c_int64) for name in ("count", "reference_count", "raw_count", "raw_bytes", "kind")),
     )
 
@@ -24,7 +25,8 @@ class CSlave(ctypes.Structure):
     """`Slave`."""
 
     _fields_ = (
-        *((name, ctypes.c_void_p) for name in ("instance", "do_step", "no_way_back", "left_at", "writes", "reads")),
+        *((name, ctypes.c_void_p) for name in ("instance", "do_step", "stepped", "no_way_back", "left_at")),
+        *((name, ctypes.c_void_p) for name in ("writes", "reads")),
         *((name, ctypes.c_int64) for name in ("write_count", "read_count", "fmi_version", "heeds_events")),
         ("usual_step", ctypes.c_double),
         ("rounding", ctypes.c_double),

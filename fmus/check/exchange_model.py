@@ -34,7 +34,7 @@ class FmuModel(FmuInstance):
     @property
     def next_event(self) -> float:
         """The next instant at which the FMU wants Event Mode [s]."""
-        return self.motion.next_event
+        return float(self.motion.next_event)
 
     @property
     def state_count(self) -> int:

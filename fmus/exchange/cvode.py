@@ -137,12 +137,14 @@ class Cvode:
         self._weights, self._views = _WEIGHTS(self._weigh), dict[int, np.ndarray]()
         self._rates, self._roots = _RATES(self._with_arrays(rates)), _RATES(self._with_roots(roots, root_count))
         self._jacobian = None if jacobian is None else _JACOBIAN(self._with_matrix(jacobian))
+        self._first_share = max(_START, min(1.0, _FINEST / tolerance))
         self.native: CExchange | None = None
         if native is not None:
             self._take(*native)
         self._reached, self._order, self._share = ctypes.c_double(), ctypes.c_int(), 1.0
         self._raised: Exception | None = None
-        self.steps = 0
+        self._steps = 0
+        self._begin()
 
     def restart(self, t: float) -> None:
         """Begin anew from what stands in `states`, with the tolerances that stand in `absolute`.
@@ -150,10 +152,8 @@ class Cvode:
         Args:
             t: instant [s].
         """
-        if self._memory is None:
-            self._begin(t)
         self._call("CVodeReInit", ctypes.c_double(t), self._x)
-        self._share = max(_START, min(1.0, _FINEST / self.tolerance))
+        self._share = self._first_share
         if self.native is not None:
             self.native.share = self._share
 
@@ -166,7 +166,7 @@ class Cvode:
         Raises:
             SolverError: it cannot go on.
         """
-        self.steps += 1
+        self._steps += 1
         self._call("CVodeSetStopTime", ctypes.c_double(stop))
         reached = self._reached
         flag = self._library.CVode(
@@ -212,6 +212,11 @@ class Cvode:
         raise SolverError(WORDS[_Cause(flag)], None if flag in _UNASKED else self._worst(_Cause(flag)))
 
     @property
+    def steps(self) -> int:
+        """How many internal steps it has taken, in Python or in C."""
+        return self._steps + (0 if self.native is None else int(self.native.steps))
+
+    @property
     def has_jacobian(self) -> bool:
         """Whether the Jacobian is a function; else it follows from differences."""
         return self._jacobian is not None
@@ -219,8 +224,7 @@ class Cvode:
     def drop_jacobian(self) -> None:
         """From now on by differences."""
         self._jacobian = None
-        if self._memory is not None:
-            self._call("CVodeSetJacFn", None)
+        self._call("CVodeSetJacFn", None)
 
     def changed_root(self) -> int:
         """Number of the first root function that changed its sign where the last step ended."""
@@ -241,10 +245,10 @@ class Cvode:
 
     # -- internals --------------------------------------------------------------------------------------------------
 
-    def _begin(self, t: float) -> None:
+    def _begin(self) -> None:
         library, context = self._library, self._context
         self._memory = library.CVodeCreate(ctypes.c_int(self._method), context)
-        self._call("CVodeInit", self._rates, ctypes.c_double(t), self._x)
+        self._call("CVodeInit", self._rates, ctypes.c_double(0.0), self._x)
         self._call("CVodeWFtolerances", self._weights)
         self._call("CVodeRootInit", ctypes.c_int(self._root_count), self._roots)
         size = ctypes.c_int64(self._count)
@@ -263,7 +267,8 @@ class Cvode:
     def _take(self, model: CExchange, functions: Any) -> None:
         """Have C in the place of the functions in Python."""
         library, model.x, model.tolerance = self._library, self._x.value, self.tolerance
-        model.absolute = self.absolute.ctypes.data
+        model.absolute, model.first_share = self.absolute.ctypes.data, self._first_share
+        model.begin, model.steps, model.rates = address(library.CVodeReInit), 0, 0
         model.array, model.set_stop = address(library.N_VGetArrayPointer), address(library.CVodeSetStopTime)
         model.step, model.last_order = address(library.CVode), address(library.CVodeGetLastOrder)
         self._rates, self._roots = _RATES(address(functions.exchange_rates)), _RATES(address(functions.exchange_roots))

@@ -11,12 +11,13 @@ from fmpy.fmi1 import FMICallException, fmi1EventInfo
 from fmpy.fmi2 import fmi2EventInfo
 
 from fmus.exchange.jacobian import DirectionalDerivatives
-from fmus.exchange.native_steps import CExchange, describe_model, load_steps
+from fmus.exchange.native_steps import CExchange, EventInfo3, describe_model, load_steps
 from fmus.fmi.native_calls import WARNING
 from fmus.fmi.standard import DISCARD, NEVER
 
 _NAMES = {
     "rates": ("GetDerivatives", "GetDerivatives", "GetContinuousStateDerivatives"),
+    "update": ("EventUpdate", "NewDiscreteStates", "UpdateDiscreteStates"),
     "nominals": ("GetNominalContinuousStates", "GetNominalsOfContinuousStates", "GetNominalsOfContinuousStates"),
 }
 """Functions whose name depends on the version of FMI, by version."""
@@ -78,16 +79,12 @@ class ModelCalls:
         self._set_time, self._set_states = self._made("SetTime"), self._made("SetContinuousStates")
         self._get_rates, self._get_indicators = self._made(self._name("rates")), self._made("GetEventIndicators")
         self._get_states, self._get_nominals = self._made("GetContinuousStates"), self._made(self._name("nominals"))
-        self._info, self._due, self._flags = (
-            fmi2EventInfo(),
-            ctypes.c_double(),
-            tuple(ctypes.c_bool() for _ in range(5)),
-        )
-        self._places: Any = ctypes.byref(self._info)
-        if version == 3:
-            self._places = (*map(ctypes.byref, self._flags), ctypes.byref(self._due))
-        if version > 1:
-            self._update = self._made("NewDiscreteStates" if version == 2 else "UpdateDiscreteStates")
+        self._info, self._info3 = fmi2EventInfo(), EventInfo3()
+        begin, fields = ctypes.addressof(self._info3), ("again", "terminate", "nominals", "values", "defined")
+        places = [begin + getattr(EventInfo3, name).offset for name in fields]
+        due = ctypes.c_double.from_address(begin + EventInfo3.next_time.offset)
+        self._places = *(ctypes.byref(ctypes.c_bool.from_address(p)) for p in places), ctypes.byref(due)
+        self._update = self._made(self._name("update"))
 
     def move(self, t: float, x: Any) -> None:
         """Set time [s] and states."""
@@ -178,17 +175,17 @@ class ModelCalls:
         """One event iteration, in Event Mode."""
         if self._version == 1:
             info = fmi1EventInfo()
-            self.call("EventUpdate", b"\x00", ctypes.byref(info))
+            self._done(self._update, b"\x00", ctypes.byref(info))
             return EventIteration.of_first(info)
         if self._version == 2:
-            self._done(self._update, self._places)
+            self._done(self._update, ctypes.byref(self._info))
             said = self._info
             due = said.nextEventTime if said.nextEventTimeDefined else NEVER
             again, end = bool(said.newDiscreteStatesNeeded), bool(said.terminateSimulation)
             return EventIteration(again, end, due, bool(said.nominalsOfContinuousStatesChanged))
         self._done(self._update, *self._places)
-        again, end, nominals, _, defined = (flag.value for flag in self._flags)
-        return EventIteration(again, end, self._due.value if defined else NEVER, nominals)
+        info = self._info3
+        return EventIteration(info.again, info.terminate, info.next_time if info.defined else NEVER, info.nominals)
 
     def completed(self) -> tuple[bool, bool]:
         """The solver completed a step that ends here: whether the FMU wants Event Mode, and the end."""
@@ -203,21 +200,28 @@ class ModelCalls:
         self.call("CompletedIntegratorStep", kind(0), ctypes.byref(enter), ctypes.byref(end))
         return bool(enter.value), bool(end.value)
 
-    def native(self) -> tuple[CExchange, Any] | None:
-        """The FMU as C calls it, and what calls it; None where there is no compiler, or its calls are logged."""
+    def native(self, made: CExchange) -> tuple[CExchange, Any] | None:
+        """The FMU as C calls it, and what calls it; None where there is no compiler, or its calls are logged.
+
+        Args:
+            made: what is filled.
+        """
         library = None if self._slave.fmiCallLogger is not None else load_steps()
         if library is None:
             return None
+        version, later = self._version, ("EnterEventMode", "EnterContinuousTimeMode")
         names = ["SetTime", "SetContinuousStates", self._name("rates"), "GetEventIndicators", "CompletedIntegratorStep"]
-        functions = [self._functions[f"fmi{self._version}{name}"] for name in names]
-        if not self._complete_steps:
-            functions[-1] = None
+        names += ["GetContinuousStates", self._name("nominals"), self._name("update")]
+        names += later if version > 1 else ("", "")
         if self.slopes is not None:
             names.append("GetDirectionalDerivative")
-            functions.append(self._functions[f"fmi{self._version}{names[-1]}"])
+        unused = "" if self._complete_steps else "CompletedIntegratorStep"
+        functions = {i: self._functions[f"fmi{version}{n}"] for i, n in enumerate(names) if n not in ("", unused)}
         counts = self.state_count, self.indicator_count
         self._names = names
-        return describe_model(self._slave.component, functions, self._version, counts, self.slopes), library
+        made.info = ctypes.addressof(self._info if version < 3 else self._info3)
+        describe_model(made, self._slave.component, functions, version, counts, self.slopes)
+        return made, library
 
     def after_native(self, model: CExchange, *, refused: bool) -> None:
         """Take over what C met: warnings are counted, and a refusal is kept, or raised outside of the solver.

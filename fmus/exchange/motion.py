@@ -15,28 +15,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from fmpy.model_description import ModelDescription
 
-from fmus.exchange.cvode import AT_ROOT, Cvode, SolverError
+from fmus.exchange.cvode import Cvode, SolverError
 from fmus.exchange.jacobian import directional_derivatives
 from fmus.exchange.model_calls import EventIteration, ModelCalls
-from fmus.exchange.native_steps import EVENT, GAVE_UP, REFUSED, TERMINATE, TOO_MANY, CExchange, load_steps
+from fmus.exchange.native_steps import ROUNDING, CExchange, MotionEnd, SharedField, load_steps
 from fmus.fmi.elements import elements_of
 from fmus.fmi.standard import (
     ERROR,
-    MAX_EVENT_ITERATIONS,
-    MAX_RETURNS_PER_STEP,
     NEVER,
     TIME_TOLERANCE,
     Method,
     fmi_version,
 )
 
-MOST_AT_ONCE = 100
-"""Events each within a billionth of a second of the one before it: a model that has more does not settle."""
-
-MOST_STEPS = 1_000_000
-"""Internal steps of the solver in one communication step."""
-
-_ROUNDING = 4e-16
 MotionState = tuple[bool, bool, float]
 """Whether it stands in Event Mode, whether the FMU asked for the end, and the next event that it knows of [s]."""
 Part = Callable[[float, float], None]
@@ -61,10 +52,23 @@ class Motion:
     Args:
         model: its calls. tolerance: relative, of the solver. method: of the solver.
         state_name: name of a state by its number, for messages.
+        at: where it stands, which C shares.
     """
 
-    def __init__(self, model: ModelCalls, tolerance: float, method: Method, state_name: Callable[[int], str]) -> None:
-        self._model, self.state_name = model, state_name
+    in_event_mode = SharedField("in_event_mode", "Whether it stands in Event Mode.")
+    terminated = SharedField("terminated", "Whether the FMU asked for the end.")
+    next_event = SharedField("next_event", "The next event that the FMU knows of [s].")
+    events = SharedField("events", "How many happened on the way, those of inputs left out.")
+
+    def __init__(
+        self,
+        model: ModelCalls,
+        tolerance: float,
+        method: Method,
+        state_name: Callable[[int], str],
+        at: CExchange | None = None,
+    ) -> None:
+        self._model, self.state_name, self.at = model, state_name, CExchange() if at is None else at
         nominals = np.ones(max(model.state_count, 1))
         self.solver = Cvode(
             len(nominals),
@@ -74,27 +78,32 @@ class Motion:
             tolerance,
             nominals,
             method,
-            model.native(),
+            model.native(self.at),
             None if model.slopes is None else model.jacobian,
         )
         self.jacobian, self.told = "differences" if model.slopes is None else "directional derivatives", False
-        """Where the Jacobian of the solver comes from, in words; whether these tell that directional derivatives are
-        not used.
-        """
+        """Where the solver has its Jacobian from; whether that tells that directional derivatives are not used."""
         self._x = self.solver.address(self.solver.states)
         self.follower: Part | None = None
-        """Called for each internal step; it may `look` at instants within it."""
         self.begin()
 
     def begin(self) -> None:
         """Initialisation has just ended: it stands in Event Mode."""
         self.in_event_mode, self.terminated, self.next_event = True, False, NEVER
-        self._nominals_known = False
-        self._last_event, self._at_once = -NEVER, 0
-        self.events = 0
-        """How many happened on the way, those of inputs left out."""
-        self._rooted = self._met = False
+        self.at.nominals_known = False
+        self.at.last_event, self.at.at_once, self.events = -NEVER, 0, 0
+        self.at.rooted = self.at.met = False
+        self.follow(None)
         self.begin_anew()
+
+    def follow(self, part: Part | None) -> None:
+        """Have somebody called for each internal step, who may `look` at instants within it.
+
+        Args:
+            part: that is called; None for nobody.
+        """
+        self.follower = part
+        self.at.elsewhere = self.solver.native is None or part is not None
 
     def state(self) -> MotionState:
         """What belongs to a saved state beside the FMU's own. What follows begins anew, as once it is restored."""
@@ -108,7 +117,7 @@ class Motion:
             state: from `state`.
         """
         self.in_event_mode, self.terminated, self.next_event = state
-        self._nominals_known = False
+        self.at.nominals_known = False
         self.begin_anew()
 
     @property
@@ -131,11 +140,11 @@ class Motion:
         Raises:
             SolverError: they do not settle.
         """
-        for _ in range(MAX_EVENT_ITERATIONS):
+        for _ in range(self.at.most_iterations):
             if not self.note(self._model.update()) or self.terminated:
                 self.leave_event_mode()
                 return
-        raise SolverError(f"discrete states do not settle in {MAX_EVENT_ITERATIONS} updates")
+        raise self._trouble(MotionEnd.UNSETTLED)
 
     def note(self, update: EventIteration) -> bool:
         """Keep what the FMU said at the end of an event iteration; True where it needs another one.
@@ -147,9 +156,9 @@ class Motion:
             SolverError: it says that the next event is at no time.
         """
         if math.isnan(update.next_event):
-            raise SolverError("the FMU says that the next event is at t = nan")
+            raise self._trouble(MotionEnd.NO_TIME)
         self.next_event, self.terminated = update.next_event, self.terminated or update.terminate
-        self._nominals_known &= not update.nominals
+        self.at.nominals_known &= not update.nominals
         return update.again
 
     def leave_event_mode(self) -> None:
@@ -161,7 +170,7 @@ class Motion:
 
     def begin_anew(self) -> None:
         """States jumped, or the FMU was set to others: the solver forgets the past."""
-        self._anew = True
+        self.at.anew = True
 
     # -- time -------------------------------------------------------------------------------------------------------
 
@@ -174,11 +183,7 @@ class Motion:
         Raises:
             FMICallException, SolverError: see `advance`.
         """
-        end = self.advance(t, until)
-        if end.event:
-            self.enter_event_mode()
-            self.settle()
-        return end._replace(terminate=end.terminate or self.terminated)
+        return self._whole(self.advance(t, until))
 
     def advance(self, t: float, until: float, *, returns: bool = False) -> _StepEnd:
         """To the end of a communication step, events on the way handled; one at its end is left to the caller.
@@ -189,9 +194,14 @@ class Motion:
         Raises:
             FMICallException: the FMU refuses. SolverError: the solver cannot go on, or events do not settle.
         """
+        library = load_steps() if not self.at.elsewhere else None
+        if library is not None:
+            ended = library.exchange_advance(ctypes.addressof(self.at), t, until, returns)
+            return self._after(MotionEnd(ended), until, returns=returns)
+        self.at.reached = t
         if until < t:
-            raise SolverError(f"a step from t = {t:.12g} s back to {until:.12g} s")
-        for _ in range(MAX_RETURNS_PER_STEP):
+            raise self._trouble(MotionEnd.BACK, until)
+        for _ in range(self.at.most_events):
             if self.in_event_mode:
                 self.settle()
                 if self.terminated:
@@ -199,10 +209,49 @@ class Motion:
             end = self._to_event(t, until)
             if end.terminate or not end.event or returns or until - end.time <= TIME_TOLERANCE:
                 return end
-            t = end.time
+            t = self.at.reached = end.time
             self.enter_event_mode()
-        most = f"{MAX_RETURNS_PER_STEP} events in one communication step"
-        raise SolverError(f"at t = {t:.12g} s: {most}, the last of them {self._event}")
+        raise self._trouble(MotionEnd.EVENTS)
+
+    def proceed(self, ended: int, until: float) -> None:
+        """See to what C left of a step; its structure has the end.
+
+        Args:
+            ended: how, see `MotionEnd`. until: where it was to end [s]; not a number where it has not begun.
+
+        Raises:
+            FMICallException, SolverError: see `advance`.
+        """
+        whole = self.at.version < 3
+        end = self._after(MotionEnd(ended), until, returns=not whole and self.at.returns)
+        if whole:
+            end = self._whole(end)
+        self.at.reached, self.at.event, self.at.end = end
+
+    def _whole(self, end: _StepEnd) -> _StepEnd:
+        """A step with the events at its end."""
+        if end.event:
+            self.enter_event_mode()
+            self.settle()
+        return end._replace(terminate=end.terminate or self.terminated)
+
+    def _after(self, ended: MotionEnd, until: float, *, returns: bool) -> _StepEnd:
+        """Where C ended; raises what the same step in Python raises, and goes on where the Jacobian was given up."""
+        at = self.at
+        if ended == MotionEnd.GAVE_UP:
+            try:
+                self.solver.fail(int(at.flag))
+            except SolverError as error:
+                return self.advance(self._given_up(error, at.reached).time, until, returns=returns)
+        self._model.after_native(at, refused=ended == MotionEnd.REFUSED)
+        if ended > MotionEnd.TERMINATE:
+            raise self._trouble(ended, until)
+        return _StepEnd(at.reached, ended == MotionEnd.EVENT, ended == MotionEnd.TERMINATE)
+
+    def _trouble(self, ended: MotionEnd, until: float = math.nan) -> SolverError:
+        """Why a step did not end, in words."""
+        last = self._event if ended in (MotionEnd.CHATTERS, MotionEnd.EVENTS) else ""
+        return SolverError(ended.words(self.at, until, last))
 
     def _to_event(self, t: float, until: float) -> _StepEnd:
         """To the first event, which is not handled, or the end of the step.
@@ -210,22 +259,24 @@ class Motion:
         Args:
             t, until: begin and end [s].
         """
-        for _ in range(MOST_STEPS):
-            self._rooted, event, stop = False, False, min(until, self.next_event)
-            if stop - t > _ROUNDING * max(abs(t), abs(stop)) * 2.0:
-                t, event, terminate = self._internal_steps(t, stop)
+        for _ in range(self.at.most_steps):
+            self.at.rooted, event, stop = False, False, min(until, self.next_event)
+            if stop - t > ROUNDING * max(abs(t), abs(stop)) * 2.0:
+                t, event, terminate = self._internal_step(t, stop)
                 if terminate:
+                    self.terminated = True
                     return _StepEnd(t, event, terminate)
             elif stop > t:
                 t = stop
                 self._model.set_time(t)
-            self._met = event
-            if event or self.next_event <= t + _ROUNDING * max(abs(t), 1.0):
+            self.at.met = event
+            self.at.reached = t
+            if event or self.next_event <= t + ROUNDING * max(abs(t), 1.0):
                 self._count_event(t)
                 return _StepEnd(t, event=True, terminate=False)
-            if t >= until - _ROUNDING * max(abs(until), 1.0):
+            if t >= until - ROUNDING * max(abs(until), 1.0):
                 return _StepEnd(until, event=False, terminate=False)
-        raise _too_many(t)
+        raise self._trouble(MotionEnd.TOO_MANY)
 
     def states(self) -> np.ndarray:
         """Continuous states where it stands, shape (n,)."""
@@ -244,47 +295,27 @@ class Motion:
         """Put the FMU at an instant within the last internal step [s], in states from the solver's polynomial."""
         self._model.move(t, self.solver.address(self.solver.between(t)))
 
-    def _internal_steps(self, t: float, stop: float) -> _StepEnd:
-        """One step of the solver, or in C all to the first event."""
-        model, solver, native = self._model, self.solver, self.solver.native
-        if self._anew:
+    def _internal_step(self, t: float, stop: float) -> _StepEnd:
+        """One step of the solver."""
+        model, solver = self._model, self.solver
+        if self.at.anew:
             model.states(self._x)
-            if not self._nominals_known:
+            if not self.at.nominals_known:
                 solver.absolute[:] = solver.tolerance * model.nominals()
-                self._nominals_known = True
+                self.at.nominals_known = True
             solver.restart(t)
-            self._anew = False
-        if native is not None and self.follower is None:
-            return self._native_steps(native, t, stop)
+            self.at.anew = False
         try:
             reached, root = solver.step(stop)
         except SolverError as error:
             return self._given_up(error, t)
-        self._rooted = root
+        self.at.rooted = root
         model.move(reached, self._x)
         if self.follower is not None:
             self.follower(t, reached)
             model.move(reached, self._x)
         wanted, terminate = model.completed()
         return _StepEnd(reached, root or wanted, terminate)
-
-    def _native_steps(self, native: CExchange, t: float, stop: float) -> _StepEnd:
-        """Steps in C; raises what the same steps in Python raise."""
-        library = load_steps()
-        assert library is not None
-        native.reached = t
-        ended = library.exchange_steps(ctypes.addressof(native), stop, MOST_STEPS)
-        self.solver.steps, native.steps = self.solver.steps + native.steps, 0
-        self._rooted = native.flag == AT_ROOT
-        if ended == GAVE_UP:
-            try:
-                self.solver.fail(int(native.flag))
-            except SolverError as error:
-                return self._given_up(error, float(native.reached))
-        self._model.after_native(native, refused=ended == REFUSED)
-        if ended == TOO_MANY:
-            raise _too_many(native.reached)
-        return _StepEnd(float(native.reached), ended == EVENT, ended == TERMINATE)
 
     def _given_up(self, error: SolverError, t: float) -> _StepEnd:
         """Where it stands, to go on by differences where the FMU gave the Jacobian up to now; else raises."""
@@ -315,32 +346,33 @@ class Motion:
     @property
     def _event(self) -> str:
         """The last event in words."""
-        if self._rooted:
+        if self.at.rooted:
             return f"where event indicator {self.solver.changed_root() + 1} changes its sign"
-        return "asked for after a step of the solver" if self._met else "announced by the FMU"
+        return "asked for after a step of the solver" if self.at.met else "announced by the FMU"
 
     def _count_event(self, t: float) -> None:
         self.events += 1
-        close = abs(t - self._last_event) <= TIME_TOLERANCE
-        self._at_once = self._at_once + 1 if close else 1
-        self._last_event = t
-        if self._at_once > MOST_AT_ONCE:
-            raise SolverError(
-                f"events do not settle at t = {t:.12g} s: {self._at_once} of them, each within {TIME_TOLERANCE:g} s of "
-                f"the one before it, the last {self._event} (a model that chatters, or a ball that bounces faster and "
-                "faster)"
-            )
+        close = abs(t - self.at.last_event) <= TIME_TOLERANCE
+        self.at.at_once = self.at.at_once + 1 if close else 1
+        self.at.last_event = t
+        if self.at.at_once > self.at.most_at_once:
+            raise self._trouble(MotionEnd.CHATTERS)
 
 
 def motion_of(
-    slave: Any, description: ModelDescription, functions: dict[str, Any], tolerance: float, method: Method = "bdf"
+    slave: Any,
+    description: ModelDescription,
+    functions: dict[str, Any],
+    tolerance: float,
+    method: Method = "bdf",
+    at: CExchange | None = None,
 ) -> Motion:
     """What moves an instance of an FMU, which stands at the end of its initialisation.
 
     Args:
         slave: fmpy's model, instantiated. description: of the FMU.
         functions: of the library by name, as it exports them.
-        tolerance: relative, of the solver. method: of the solver.
+        tolerance: relative, of the solver. method: of the solver. at: as for `Motion`.
     """
     version, interface = fmi_version(description), description.modelExchange
     unneeded = getattr(interface, "completedIntegratorStepNotNeeded", False)
@@ -356,8 +388,4 @@ def motion_of(
     def name(number: int) -> str:
         return f"state '{names[number]}'" if number < len(names) else f"state {number + 1}"
 
-    return Motion(model, tolerance, method, name)
-
-
-def _too_many(t: float) -> SolverError:
-    return SolverError(f"at t = {t:.12g} s: the solver takes more than {MOST_STEPS} steps in one communication step")
+    return Motion(model, tolerance, method, name, at)

@@ -22,7 +22,9 @@ from fmpy.model_description import ModelDescription
 from fmus.exchange.cvode import SolverError
 from fmus.exchange.model_calls import EventIteration
 from fmus.exchange.motion import Motion, Part, motion_of
-from fmus.exchange.states import Sent, StoredStates
+from fmus.exchange.native_steps import CExchange, SharedField, address, load_steps
+from fmus.exchange.sent import Key, SentValues
+from fmus.exchange.states import StoredStates
 from fmus.fmi.standard import DISCARD, ERROR, NEVER, OK, TIME_TOLERANCE, WARNING, Method, fmi_version
 from fmus.fmi.types import BOOLEANS, CTYPES
 
@@ -45,17 +47,23 @@ class CoSimulationFunctions:
         description: its model description. method: of the solver.
     """
 
+    reached, length = (
+        SharedField("arrived", "Where the last step ended [s]."),
+        SharedField("length", "How long it was to be [s]."),
+    )
+
     def __init__(self, slave: Any, description: ModelDescription, method: Method = "bdf") -> None:
         self._slave, self._description, self._method = slave, description, method
         self._version, self._functions = fmi_version(description), dict(slave._functions)
         self.motion: Motion | None = None
-        self.tolerance, self.reached, self._start = TOLERANCE, 0.0, 0.0
-        self.sent, self.length, self._widths = Sent(), 0.0, dict[str, int]()
+        self.tolerance, self._start = TOLERANCE, 0.0
+        self.sent, self.at, self._widths = SentValues(), CExchange(), dict[str, int]()
         self._kept, self._library = list[Any](), dict[str, Any]()
         for name, install in self._names().items():
             self._install(f"fmi{self._version}{name}", *install)
         for name in [n for n in self._functions if n[4:7] == "Set" and n[7:] in {*CTYPES, "Boolean"}]:
             self._install(name, self._setter(name), *self._types_of(name))
+        self._share_steps()
 
     # -- what a master asks beside functions -------------------------------------------------------------------------
 
@@ -66,7 +74,7 @@ class CoSimulationFunctions:
             part: see `Motion.follower`; None for nobody.
         """
         if self.motion is not None:
-            self.motion.follower = part
+            self.motion.follow(part)
 
     def look(self, t: float) -> None:
         """Put the FMU at an instant within the solver's last step, while somebody follows it.
@@ -106,7 +114,7 @@ class CoSimulationFunctions:
         """setupExperiment of FMI 2, enterInitializationMode of FMI 3: both begin with the tolerance."""
         defined, tolerance, self._start = arguments[:3]
         self.tolerance = tolerance if defined and tolerance > 0.0 else TOLERANCE
-        self.motion = None
+        self._stand_still()
         return call(instance, *arguments)
 
     def _initialised(self, call: Callable[..., int], instance: Any) -> int:
@@ -134,8 +142,13 @@ class CoSimulationFunctions:
             self._motion.leave_event_mode()
 
     def _begin(self) -> None:
-        self.motion = motion_of(self._slave, self._description, self._functions, self.tolerance, self._method)
+        slave, description, functions = self._slave, self._description, self._functions
+        self.motion = motion_of(slave, description, functions, self.tolerance, self._method, self.at)
         self.reached = self._start
+
+    def _stand_still(self) -> None:
+        """Nothing moves it until it is initialised."""
+        self.motion, self.at.elsewhere = None, True
 
     @property
     def _motion(self) -> Motion:
@@ -144,6 +157,35 @@ class CoSimulationFunctions:
         return self.motion
 
     # -- steps ------------------------------------------------------------------------------------------------------
+
+    def native(self, name: str, references: bytes = b"") -> tuple[int, int] | None:
+        """A function that steps or sets in C: its address, and what it takes in place of the instance; None where
+        Python does it, through the table of functions.
+
+        Args:
+            name: of doStep, or of a setter. references: value references of what is set, as C has them.
+        """
+        library, installed = load_steps(), self._slave._functions.get(name)
+        if library is None or name not in self._library:
+            return None
+        if name.endswith("DoStep"):
+            return address(library[f"exchange_step{self._version}"]), ctypes.addressof(self.at)
+        entry = self.sent.entry((name, references))
+        entry.exchange, entry.function = ctypes.addressof(self.at), address(self._library[name])
+        entry.otherwise = address(installed)
+        return address(library.exchange_set), ctypes.addressof(entry)
+
+    def _share_steps(self) -> None:
+        """What C calls where it does not make a step itself."""
+        call = self._kept_function(self._proceed, ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_int64, ctypes.c_double))
+        self.at.proceed = address(call)
+        self.at.otherwise = address(self._slave._functions[f"fmi{self._version}DoStep"])
+        self.at.returns = self._description.coSimulation.mightReturnEarlyFromDoStep
+
+    def _proceed(self, ended: int, until: float) -> int:
+        """See to what C left of a step."""
+        self._motion.proceed(ended, until)
+        return OK
 
     def _step(self, _call: Any, _instance: Any, t: float, h: float, _past: Any, *results: int) -> int:
         if self._version == 3:
@@ -157,8 +199,8 @@ class CoSimulationFunctions:
         self.length = until - t
         end = self._motion.advance(t, until, returns=self._description.coSimulation.mightReturnEarlyFromDoStep)
         returned = until - end.time > TIME_TOLERANCE
-        for address, said in ((event, end.event), (terminate, end.terminate), (early, returned)):
-            ctypes.c_bool.from_address(address).value = said
+        for place, said in ((event, end.event), (terminate, end.terminate), (early, returned)):
+            ctypes.c_bool.from_address(place).value = said
         ctypes.c_double.from_address(reached).value = self.reached = end.time
         return OK
 
@@ -182,19 +224,10 @@ class CoSimulationFunctions:
                 self.motion.enter_event_mode()
             status = call(instance, references, n, values, *more)
             if status <= WARNING:
-                self._forget_overlapping(key)
-                self.sent[key] = content
+                self.sent.put(key, content)
             return status
 
         return set_values
-
-    def _forget_overlapping(self, key: tuple[str, bytes]) -> None:
-        """What other groups of variables were set to, as far as they share one with this group."""
-        name, references = key
-        own = set(memoryview(references).cast("I"))
-        for other in [k for k in self.sent if k != key and k[0] == name]:
-            if not own.isdisjoint(memoryview(other[1]).cast("I")):
-                del self.sent[other]
 
     # -- events of FMI 3, which the master handles ---------------------------------------------------------------------
 
@@ -220,7 +253,7 @@ class CoSimulationFunctions:
         """What moves it."""
         return self._motion
 
-    def put(self, key: tuple[str, bytes], content: bytes) -> None:
+    def put(self, key: Key, content: bytes) -> None:
         """Set variables as they were, through Event Mode.
 
         Args:
@@ -234,8 +267,7 @@ class CoSimulationFunctions:
         status = self._library[name](self._slave.component, *places, *more)
         if status > WARNING:
             raise FMICallException(name, status)
-        self._forget_overlapping(key)
-        self.sent[key] = content
+        self.sent.put(key, content)
 
     def get_reals(self, references: Sequence[int]) -> np.ndarray:
         """Real scalars, shape (n,).
@@ -247,7 +279,8 @@ class CoSimulationFunctions:
         return np.array(get(list(references)) if references else [], dtype=float)
 
     def _reset(self, call: Callable[..., int], instance: Any) -> int:
-        self.motion, self.sent = None, {}
+        self._stand_still()
+        self.sent.restore({})
         return call(instance)
 
     # -- installation -----------------------------------------------------------------------------------------------
@@ -293,10 +326,19 @@ class CoSimulationFunctions:
         library = None if own is None else prototype(ctypes.cast(own, ctypes.c_void_p).value or 0)
         self._library[name] = library
 
+        installed = self._kept_function(lambda *arguments: function(library, *arguments), prototype)
+        installed.argnames = tuple(f"argument {k}" for k in range(len(types) + 1))
+        self._slave._functions[name] = installed
+        if own is None:
+            setattr(self._slave, name, lambda *arguments: self._slave._call(name, *arguments))
+
+    def _kept_function(self, function: Callable[..., int], prototype: Any) -> Any:
+        """A function for C, which returns a status; what went wrong stands in the slave's `reason`."""
+
         def called(*arguments: Any) -> int:
             self._slave.reason = ""
             try:
-                return function(library, *arguments)
+                return function(*arguments)
             except FMICallException as error:
                 self._slave.reason = str(error)
                 return int(error.status)
@@ -307,12 +349,8 @@ class CoSimulationFunctions:
                 self._slave.reason = f"{type(error).__name__}: {error}"
                 return ERROR
 
-        installed = prototype(called)
-        installed.argnames = tuple(f"argument {k}" for k in range(len(types) + 1))  # type: ignore[attr-defined]
-        self._kept.append(installed)
-        self._slave._functions[name] = installed
-        if own is None:
-            setattr(self._slave, name, lambda *arguments: self._slave._call(name, *arguments))
+        self._kept.append(prototype(called))
+        return self._kept[-1]
 
 
 def as_slave(slave: Any, description: ModelDescription, method: Method = "bdf") -> Any:

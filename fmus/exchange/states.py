@@ -21,11 +21,10 @@ from fmpy.model_description import ModelDescription
 
 from fmus.exchange.cvode import SolverError
 from fmus.exchange.motion import Motion, MotionState
+from fmus.exchange.sent import Content, Key, SentValues
 from fmus.fmi.standard import OK, WARNING, fmi_version
 from fmus.fmi.types import REAL_TYPE, is_continuous
 
-Sent = dict[tuple[str, bytes], bytes]
-"""What was set last: values by function and value references, as C has them."""
 _PROBED, _SHARE = 1e-3, 0.01
 """Length of the step that is made twice [s], where none was made before, and as a share of one that was: an event in it
 could not be taken back.
@@ -37,7 +36,7 @@ _SAME = 10.0
 class _Stepped(Protocol):
     """What states are saved of: see `slave.CoSimulationFunctions`."""
 
-    sent: Sent
+    sent: SentValues
     reached: float
     length: float
     tolerance: float
@@ -45,7 +44,7 @@ class _Stepped(Protocol):
     @property
     def moved(self) -> Motion: ...
 
-    def put(self, key: tuple[str, bytes], content: bytes) -> None: ...
+    def put(self, key: Key, content: bytes) -> None: ...
 
     def get_reals(self, references: Sequence[int]) -> np.ndarray: ...
 
@@ -56,7 +55,7 @@ class _Saved:
 
     held: ctypes.c_void_p | None
     states: np.ndarray
-    sent: Sent
+    sent: Content
     motion: MotionState
     time: float
     events: int
@@ -124,7 +123,8 @@ class StoredStates:
         else:
             status = call(instance, saved.held.value)
             self._of.moved.restore(saved.motion)
-        self._of.sent, self._of.reached = dict(saved.sent), saved.time
+        self._of.sent.restore(saved.sent)
+        self._of.reached = saved.time
         return status
 
     def _release(self, call: Callable[..., int], instance: Any, place: int) -> int:
@@ -169,7 +169,7 @@ class StoredStates:
     def _here(self, held: ctypes.c_void_p | None) -> _Saved:
         of = self._of
         states, motion = of.moved.states(), of.moved.state()
-        return _Saved(held, states, dict(of.sent), motion, of.reached, of.moved.events)
+        return _Saved(held, states, of.sent.all(), motion, of.reached, of.moved.events)
 
     def _keep(self, saved: _Saved, place: int) -> None:
         number = next(self._numbers)
@@ -184,7 +184,7 @@ class StoredStates:
                 f"an event happened since t = {saved.time:.12g} s, and the FMU saves no states "
                 "(canGetAndSetFMUstate): it cannot be put back before it"
             )
-        if not _set_in(of.sent) <= _set_in(saved.sent):
+        if not _set_in(of.sent.all()) <= _set_in(saved.sent):
             raise SolverError(
                 f"a variable was set for the first time since t = {saved.time:.12g} s: what it was is lost"
             )
@@ -225,7 +225,7 @@ class StoredStates:
             )
 
 
-def _set_in(sent: Sent) -> set[tuple[str, int]]:
+def _set_in(sent: Content) -> set[tuple[str, int]]:
     """Which variables were set, by function and value reference."""
     return {(name, reference) for name, references in sent for reference in memoryview(references).cast("I")}
 

@@ -1,9 +1,11 @@
-/* Internal steps of CVODE over a model exchange FMU: what `cvode.py` and `motion.py` do in Python, without Python between. */
+/* A model exchange FMU as CVODE asks it, and internal steps of CVODE: what `cvode.py` and `model_calls.py` do in Python, without
+   Python between. Part of `motion.c`. */
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #if defined(_WIN32)
 #define EXPORT __declspec(dllexport)
@@ -11,23 +13,27 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-enum { SET_TIME, SET_STATES, GET_RATES, GET_INDICATORS, COMPLETED, GET_SLOPES, FUNCTIONS };
+enum {
+    SET_TIME, SET_STATES, GET_RATES, GET_INDICATORS, COMPLETED, GET_STATES, GET_NOMINALS, UPDATE, ENTER_EVENT, ENTER_CONTINUOUS, GET_SLOPES,
+    FUNCTIONS,
+};
 enum { WARNING = 1, DISCARD = 2 };
 #define SHIFT 1e-7
 enum { ONE_STEP = 2, AT_STOP = 1, AT_ROOT = 2, STARTED = 3 };
-enum { REACHED, EVENT, TERMINATE, GAVE_UP, REFUSED, TOO_MANY };
+enum { REACHED, EVENT, TERMINATE, GAVE_UP, REFUSED, TOO_MANY, NO_TIME, UNSETTLED, CHATTERS, EVENTS, BACK };
 
 typedef struct {
     void *functions[FUNCTIONS]; /* of the FMU; COMPLETED is NULL where it need not be told of completed steps */
     void *instance;
     int64_t version, states, indicators;
     double *(*array)(void *vector);
+    int (*begin)(void *memory, double t, void *x);
     int (*set_stop)(void *memory, double stop);
     int (*step)(void *memory, double stop, void *x, double *reached, int task);
     int (*last_order)(void *memory, int *order);
     void *memory, *x;
-    const double *absolute;
-    double tolerance, share, reached; /* `reached`: where it stands [s] */
+    double *absolute;
+    double tolerance, share, first_share, reached; /* `reached`: where it stands [s] */
     int64_t steps, flag, status, place; /* what CVODE said last; what the FMU refused with, and which function did */
     int64_t rates; /* how often derivatives were asked for */
     const uint32_t *unknowns, *knowns; /* value references of the derivatives, and of what each state is an element of */
@@ -37,6 +43,20 @@ typedef struct {
     int64_t unknown_count, differing; /* number of the derivative whose slope is not what a difference gives, from 1 */
     int64_t noted; /* whether there is anything to be said of warnings, refusals and slopes */
     int64_t warnings[FUNCTIONS];
+    /* its motion */
+    double next_event, last_event; /* that the FMU knows of, and the last one [s] */
+    int64_t events, at_once;       /* how many on the way, and how many of them within a billionth of a second before */
+    int64_t most_steps, most_iterations, most_events, most_at_once;
+    double tolerated, rounding; /* instants closer than this are the same [s]; what instants lose, relative */
+    bool in_event_mode, terminated, anew, nominals_known;
+    bool rooted, met; /* what the last event was: an indicator changed its sign; asked for by the FMU, or that */
+    bool returns;     /* every event ends a step, and is left to the master */
+    bool elsewhere;   /* Python makes the steps */
+    bool event, end;  /* where the last step ended: at an event; the FMU asks for the end */
+    void *info;       /* what it says at the end of an event iteration */
+    double arrived, length; /* where the last step ended, and how long it was to be [s] */
+    void *otherwise;        /* doStep in Python */
+    int (*proceed)(int64_t ended, double until); /* Python sees to what C does not; it returns a status of FMI */
 } Exchange;
 
 typedef int (*SetTime)(void *, double);
@@ -186,8 +206,8 @@ static bool completed(Exchange *e, bool *event, bool *terminate) {
 }
 
 /* Internal steps to `stop` [s], or to the first event before it. */
-EXPORT int64_t exchange_steps(Exchange *e, double stop, int64_t most) {
-    for (int64_t k = 0; k < most; k++) {
+static int64_t internal_steps(Exchange *e, double stop) {
+    for (int64_t k = 0; k < e->most_steps; k++) {
         bool event, terminate;
         int order = STARTED;
         double reached = stop;
@@ -205,6 +225,7 @@ EXPORT int64_t exchange_steps(Exchange *e, double stop, int64_t most) {
         e->reached = e->flag == AT_STOP ? stop : reached;
         if (!move(e, e->reached, e->array(e->x)) || !completed(e, &event, &terminate))
             return REFUSED;
+        e->terminated |= terminate;
         if (terminate)
             return TERMINATE;
         if (event || e->flag == AT_ROOT)

@@ -188,7 +188,7 @@ def test_steps_of_the_solver_in_c_give_the_bits_and_words_of_those_in_python(
     seen = []
     for native in (True, False):
         if not native:
-            monkeypatch.setattr(ModelCalls, "native", lambda _self: None)
+            monkeypatch.setattr(ModelCalls, "native", lambda *_: None)
         fmu, rows = Stepped(exchange_fmu(folder, model, version), 1e-7), list[object]()
         assert (fmu.component.slave.solved.motion.solver.native is not None) == native
         try:

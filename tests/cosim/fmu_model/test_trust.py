@@ -22,7 +22,7 @@ from cosim.fmu_model.linearise import _linearise_model, _objections
 from cosim.fmu_model.opening import open_model
 from cosim.fmu_model.sealed import FmuModelError, SealedModel
 from cosim.fmu_model.trust import check_saving, check_states
-from fmus.exchange import motion
+from fmus.exchange import native_steps
 from fmus.fmi.standard import Interface
 from plant_models import PLANTS
 
@@ -208,7 +208,7 @@ def test_events_of_model_exchange_are_handled() -> None:
 
 
 def test_a_state_that_chatters_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(motion, "MAX_RETURNS_PER_STEP", 1)
+    monkeypatch.setattr(native_steps, "MAX_RETURNS_PER_STEP", 1)
     model = open_model(fmus.cached_fmu(PLANTS["locomotive"](), fmi_version=3), "model-exchange")
     x = np.array([0.0, 0.02, 0.02 / 0.575])  # stops within the step
     with pytest.raises(FmuModelError, match=r"t = 2\.\d+ s: 1 events .*, the last .* event indicator \d"):

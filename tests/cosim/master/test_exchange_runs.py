@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import fmpy
 import numpy as np
@@ -13,6 +13,9 @@ from test_fmus.exchange import exchange_fmu
 import fmus
 from cosim import CosimError, Outcome, Scenario
 from fmu_observer import OBSERVERS
+from fmus.exchange.model_calls import ModelCalls
+from fmus.exchange.motion import Motion
+from fmus.exchange.sent import SentValues
 from plant_models import Locomotive
 
 MOVING = {"train_speed": 10.0, "wheel_rate": 10.0 / 0.575, "effort": 3e4}
@@ -63,16 +66,49 @@ def test_a_train_moves_as_under_the_solver_of_fmpy(tmp_path: Path, version: Lite
         assert np.abs(ours[f"train.{signal}"] - theirs[signal][at]).max() < 1e-5
 
 
-@pytest.mark.parametrize("model", ["TRAIN", "DECAY", "STEPS"])
+def coupled(fmu: Path, stepper: str) -> Outcome:
+    """Two of an FMU; what the first shows is the input of the second, which jumps at each communication point."""
+    s = Scenario(stop=2.0, step=0.1).add("plant", fmu=str(fmu), parameters={"input": 0.3})
+    s = s.add("other", fmu=str(fmu)).connect("plant.position -> other.input")
+    return s.set("master.stepper", stepper).set("master.events", "local").run()
+
+
+@pytest.mark.parametrize("model", ["TRAIN", "DECAY", "STEPS", "BALL", "REACTION", "ESCAPES"])
 @pytest.mark.parametrize("version", [1, 2, 3])
-def test_both_steppers_give_equal_bits(tmp_path: Path, model: str, version: int) -> None:
+def test_both_steppers_and_a_solver_in_python_give_equal_bits(
+    tmp_path: Path, model: str, version: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fmu = exchange_fmu(tmp_path, model, version)
-    outcomes = []
-    for stepper in ("python", "compiled"):
-        s = Scenario(stop=2.0, step=0.1).add("plant", fmu=str(fmu), parameters={"input": 0.3})
-        s = s.add("other", fmu=str(fmu)).connect("plant.position -> other.input")
-        outcomes.append(s.set("master.stepper", stepper).set("master.events", "local").run())
-    assert outcomes[0].result.table.tobytes() == outcomes[1].result.table.tobytes()
+    outcomes = [coupled(fmu, "python"), coupled(fmu, "compiled")]
+    monkeypatch.setattr(ModelCalls, "native", lambda *_: None)
+    outcomes.append(coupled(fmu, "python"))
+    assert len({outcome.result.table.tobytes() for outcome in outcomes}) == 1
+    assert len({outcome.failure for outcome in outcomes}) == 1
+    counts = [[c["solver"] for c in outcome.result.summary["components"]] for outcome in outcomes]
+    assert counts[0] == counts[1] == counts[2]
+
+
+@pytest.mark.parametrize(("model", "version"), [("TRAIN", 1), ("TRAIN", 2), ("TRAIN", 3), ("BALL", 1), ("BALL", 2)])
+def test_inputs_that_jump_are_handled_without_python(
+    tmp_path: Path, model: str, version: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    called = list[str]()
+
+    def noted(where: type, name: str) -> None:
+        own = getattr(where, name)
+
+        def note(*arguments: Any, **named: Any) -> Any:
+            called.append(name)
+            return own(*arguments, **named)
+
+        monkeypatch.setattr(where, name, note)
+
+    noted(Motion, "advance")
+    noted(Motion, "proceed")
+    noted(SentValues, "put")
+    assert coupled(exchange_fmu(tmp_path, model, version), "compiled").failure is None
+    assert set(called) == {"put"}  # a value is met first in Python
+    assert len(called) <= 8  # of two components, before the first step and in it
 
 
 def test_the_summary_and_the_structure_say_what_moves_it(tmp_path: Path) -> None:
