@@ -12,6 +12,7 @@ from cosim.evaluation.metrics import FEWEST_INSTANTS
 from cosim.evaluation.spec import ReportSpec
 from cosim.expectations.evaluated import written
 from cosim.results.result import Result
+from cosim.results.shown_unit import ShownUnit
 
 _ROUNDING = 1e-9  # relative; times closer than this are the same
 
@@ -96,9 +97,9 @@ class EvaluatedRun:
             raise NotRecordedError(f"nothing measured: {signal} was not recorded")
         return self.result[signal]
 
-    def unit(self, signal: str) -> str:
-        """SI unit of a recorded signal."""
-        return next((info.unit for info in self.result.signals if info.name == signal), "1")
+    def shown(self, signal: str) -> ShownUnit:
+        """The unit in which texts name values of a recorded signal, as pages, tables and pictures do."""
+        return next((info.shown for info in self.result.signals if info.name == signal), ShownUnit())
 
 
 class NotRecordedError(Exception):

@@ -12,6 +12,7 @@ import numpy as np
 from cosim.evaluation.metrics import error_size, instants
 from cosim.expectations.evaluated import Evaluated, at, with_unit, written
 from cosim.expectations.evaluated_run import TimeWindow
+from cosim.results.shown_unit import ShownUnit
 
 
 def difference(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -24,12 +25,12 @@ def difference(values: np.ndarray, reference: np.ndarray) -> np.ndarray:
         return np.asarray(values - reference)
 
 
-def evaluate_sizes(name: str, item: Any, window: TimeWindow, error: np.ndarray, unit: str) -> list[Evaluated]:
+def evaluate_sizes(name: str, item: Any, window: TimeWindow, error: np.ndarray, unit: ShownUnit) -> list[Evaluated]:
     """Largest size and root mean square of an error, as far as they are limited.
 
     Args:
         name: of the expectation, with a place for which of the two it is. item: its table, with `max` and `rms`.
-        window: that it speaks of. error: shape (rows,). unit: of the error.
+        window: that it speaks of. error: in SI, shape (rows,). unit: in which texts name it.
     """
     time, shown = window.time, error[window.rows]
     size = error_size(time, shown)
@@ -42,14 +43,18 @@ def evaluate_sizes(name: str, item: Any, window: TimeWindow, error: np.ndarray, 
             "name": name.format(f", {what}"),
             "check": item.check,
             "limit": limit,
-            "unit": unit,
+            "unit": unit.kept,
         }
         nothing = _nothing_measured(window, time, shown, window.fewest)
         if nothing is not None:
             found.append(Evaluated(passed=False, **evaluated, **nothing))
             continue
         when = float(time[np.argmax(np.abs(shown))]) if what == "max" else nan
-        text = f"{with_unit(measured, unit)}{at(when)}, allowed {written(limit, unit)}"
+        value, allowed = (
+            with_unit(unit.difference(measured), unit.name),
+            _as_stated(limit, unit, unit.difference(limit)),
+        )
+        text = f"{value}{at(when)}, allowed {allowed}"
         passed = measured <= limit
         text += f"; {window.unreached}" if passed and window.broken else ""
         found.append(
@@ -66,6 +71,7 @@ def bounded(
     values: np.ndarray,
     low: float,
     high: float,
+    unit: ShownUnit,
     *,
     last: bool = False,
 ) -> Evaluated:
@@ -73,9 +79,10 @@ def bounded(
 
     Args:
         name: of the expectation. base: what else is known of it. window: that it speaks of.
-        time, values: in the window, shape (rows,). low, high: the bounds. last: whether only the last value counts.
+        time, values: in the window, shape (rows,). low, high: the bounds, all in SI. unit: in which texts name them.
+        last: whether only the last value counts.
     """
-    unit = base["unit"]
+    base = base | {"unit": unit.kept}
     nothing = _nothing_measured(window, time, values, 1 if last else window.fewest)
     if nothing is not None:
         return Evaluated(name, passed=False, limit=low if high == inf else high, **base, **nothing)
@@ -83,17 +90,25 @@ def bounded(
     row = int(np.argmax(excess))
     measured, when = float(values[row]), float(time[row])
     passed = bool(low <= measured <= high)
-    allowed = f"at least {written(low, unit)}" if high == inf else f"at most {written(high, unit)}"
+    least, most = (_as_stated(limit, unit, unit.value(limit)) for limit in (low, high))
+    allowed = f"at least {least}" if high == inf else f"at most {most}"
     if last:
-        allowed = f"{written(low)} to {written(high, unit)}"
+        allowed = f"{written(low)} to {most}" if unit.is_kept else f"{least} to {most}"
     limit = low if high == inf or measured < low else high
-    text = f"{with_unit(measured, unit)}{at(when)}, expected {allowed}"
+    value = with_unit(unit.value(measured), unit.name)
+    text = f"{value}{at(when)}, expected {allowed}"
     text += f"; {window.unreached}" if passed and window.broken else ""
     if last and window.broken:
-        text, passed = f"{with_unit(measured, unit)} so far, expected {allowed}; {window.unreached}", False
+        text, passed = f"{value} so far, expected {allowed}; {window.unreached}", False
     return Evaluated(
         name, passed=passed and not window.broken, measured=measured, limit=limit, when=when, text=text, **base
     )
+
+
+def _as_stated(limit: float, unit: ShownUnit, shown: float) -> str:
+    """A limit as it is shown, and behind it as the scenario states it, which is in SI."""
+    text = written(shown, unit.name)
+    return text if unit.is_kept else f"{text} ({written(limit, unit.kept)})"
 
 
 def _nothing_measured(window: TimeWindow, time: np.ndarray, values: np.ndarray, fewest: int) -> dict[str, Any] | None:

@@ -13,6 +13,7 @@ from cosim.expectations.evaluated import Evaluated, at, with_unit
 from cosim.expectations.evaluated_run import EvaluatedRun, span
 from cosim.expectations.expectation import PairExpectation
 from cosim.expectations.sizes import bounded, difference
+from cosim.results.shown_unit import ShownUnit
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
@@ -42,14 +43,15 @@ class BoundExpectation(PairExpectation):
     def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """The largest share of the bound that the error takes; it is broken where that exceeds 1."""
         error = np.abs(difference(run.recorded(self.signal), run.recorded(self.reference)))
-        bound, window, unit = run.recorded(self.bound), run.window(self.start, self.end), run.unit(self.signal)
+        bound, window, unit = run.recorded(self.bound), run.window(self.start, self.end), run.shown(self.signal)
         name = f"{self.bound} of {self.signal} beside {self.reference}{span(self.start, self.end)}"
         share = _share(error, bound)[window.rows]
-        found = bounded(name, {"check": self.check, "unit": "1"}, window, window.time, share, -inf, 1.0)
+        found = bounded(name, {"check": self.check}, window, window.time, share, -inf, 1.0, ShownUnit())
         if not np.isfinite(found.measured):
             return [found]
         row = int(np.argmax(share))
-        worst = f"{with_unit(error[window.rows][row], unit)} of {with_unit(bound[window.rows][row], unit)}"
+        sizes = (unit.difference(float(values[window.rows][row])) for values in (error, bound))
+        worst = " of ".join(with_unit(size, unit.name) for size in sizes)
         broken = int(np.count_nonzero(share > 1.0))
         text = f"at most {100.0 * found.measured:.3g} % of the bound, {worst}{at(found.when)}"
         if broken:

@@ -20,4 +20,4 @@ class DifferenceExpectation(PairExpectation, LimitedExpectation):
         error = difference(run.recorded(self.signal), run.recorded(self.reference))
         window = run.window(self.start, self.end)
         name = f"difference of {self.signal} and {self.reference}"
-        return evaluate_sizes(name + "{}" + span(self.start, self.end), self, window, error, run.unit(self.signal))
+        return evaluate_sizes(name + "{}" + span(self.start, self.end), self, window, error, run.shown(self.signal))

@@ -9,6 +9,7 @@ from cosim.expectations.evaluated import Evaluated
 from cosim.expectations.evaluated_run import EvaluatedRun, NotRecordedError, span
 from cosim.expectations.expectation import LimitedExpectation
 from cosim.expectations.sizes import difference, evaluate_sizes
+from cosim.results.shown_unit import ShownUnit
 from cosim.toml_table import Name
 
 if TYPE_CHECKING:
@@ -59,5 +60,7 @@ class ErrorExpectation(LimitedExpectation):
         for observer in [self.of] if isinstance(self.of, str) else self.of or run.spec.observers:
             error = difference(run.recorded(f"{observer}.{output}"), run.recorded(true))
             name = f"{self.check} of {observer}"
-            found += evaluate_sizes(name + "{}" + span(self.start, self.end), self, window, error, unit)
+            found += evaluate_sizes(
+                name + "{}" + span(self.start, self.end), self, window, error, ShownUnit(unit, kept=unit)
+            )
         return found

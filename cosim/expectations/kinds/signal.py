@@ -45,15 +45,17 @@ class SignalExpectation(WindowExpectation):
 
     def evaluate(self, run: EvaluatedRun) -> list[Evaluated]:
         """Smallest, largest and last value of a signal."""
-        values, unit, window = run.recorded(self.signal), run.unit(self.signal), run.window(self.start, self.end)
+        values, unit, window = run.recorded(self.signal), run.shown(self.signal), run.window(self.start, self.end)
         shown, when = values[window.rows], window.time
-        base: dict[str, Any] = {"check": self.check, "unit": unit}
+        base: dict[str, Any] = {"check": self.check}
         name = f"{self.signal}{{}}{span(self.start, self.end)}"
         found = []
         if self.min is not None:
-            found.append(bounded(name.format(", min"), base, window, when, shown, self.min, inf))
+            found.append(bounded(name.format(", min"), base, window, when, shown, self.min, inf, unit))
         if self.max is not None:
-            found.append(bounded(name.format(", max"), base, window, when, shown, -inf, self.max))
+            found.append(bounded(name.format(", max"), base, window, when, shown, -inf, self.max, unit))
         if self.final is not None:
-            found.append(bounded(name.format(", final"), base, window, when[-1:], shown[-1:], *self.final, last=True))
+            found.append(
+                bounded(name.format(", final"), base, window, when[-1:], shown[-1:], *self.final, unit, last=True)
+            )
         return found

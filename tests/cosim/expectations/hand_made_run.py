@@ -81,7 +81,7 @@ def hand_made(
     table["time"] = TIME[rows]
     for name, values in all_columns.items():
         table[name] = values[rows]
-    signals = [SignalInfo(name, UNITS[name.partition(".")[2]]) for name in all_columns]
+    signals = [SignalInfo(name, UNITS.get(name.partition(".")[2], "1")) for name in all_columns]
     return Result(table, signals, [e for e in telegrams() if e.stamp <= until], summary(), failure)
 
 

@@ -423,3 +423,24 @@ def test_the_hand_made_run_is_what_it_says() -> None:
     error = columns()["observer.speed"] - columns()["train.speed"]
     assert sorted(set(np.round(error, 9))) == [-0.1, 0.5]
     assert TIME[AFTER][0] == 5.0
+
+
+def test_a_text_names_the_unit_in_which_pages_show_the_signal_and_the_limit_as_it_is_stated() -> None:
+    """What is judged, and stands in data, stays in SI; a difference has no offset."""
+    run = hand_made(changes={"plant.T": 293.15 + TIME, "plant.set": np.full(12, 293.15)})
+    shown = {"train.speed": "km/h", "observer.speed": "km/h", "plant.T": "degC"}
+    kept = {"plant.T": "K", "plant.set": "K"}
+    signals = [replace(s, display_unit=shown.get(s.name), unit=kept.get(s.name, s.unit)) for s in run.signals]
+    items = [
+        {"check": "signal", "signal": "train.speed", "max": 5.0},
+        {"check": "signal", "signal": "plant.T", "final": [273.15, 283.15]},
+        {"check": "difference", "signal": "plant.T", "reference": "plant.set", "max": 5.0},
+        BOUND | {"bound": "other.speed"},
+    ]
+    speed, warm, warmer, bound = evaluated(Result(run.table, signals), *items)
+    assert (speed.measured, speed.limit, speed.unit) == (10.0, 5.0, "m/s")
+    assert speed.text == "36.00 km/h (at 0 s), expected at most 18 km/h (5 m/s)"
+    assert (warm.measured, warm.unit) == (303.15, "K")
+    assert warm.text == "30.00 degC (at 10 s), expected 0 degC (273.15 K) to 10 degC (283.15 K)"
+    assert warmer.text == "10.00 degC (at 10 s), allowed 5 degC (5 K)"
+    assert "1.800 km/h of 36.90 km/h" in bound.text

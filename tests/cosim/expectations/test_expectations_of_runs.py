@@ -200,9 +200,9 @@ def test_the_command_ends_with_1_where_something_is_unmet(
     assert main(["run", write(tmp_path, limit), "--out", str(tmp_path / "out"), "--quiet"]) == code
     printed = capsys.readouterr().out
     assert head in printed
-    assert bool(re.search(r"not met +train.speed, max +0 m/s \(at 0 s\), expected at most -1 m/s", printed)) is (
-        code == 1
-    )
+    assert bool(
+        re.search(r"not met +train.speed, max +0 km/h \(at 0 s\), expected at most -3.6 km/h \(-1 m/s\)", printed)
+    ) is (code == 1)
     page = (tmp_path / "out" / "report.html").read_text()
     assert ("expectations are not met" in page) is (code == 1)
     assert "train.speed, max" in page
