@@ -8,8 +8,10 @@ row costs no call and none is lost. Touches only the file it is given.
 from __future__ import annotations
 
 import mmap
+import weakref
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +34,7 @@ class BlockFile:
 
     `rows` is the block, shape (rows, width), in the units it is recorded in; `cells[COUNT]` says how many of its rows
     are filled and `cells[FIRST]` which number in the whole table the first one has. Both are kept by whoever fills it.
+    Only rows may be filled that `reserve` has set space aside for: at first one.
 
     Raises:
         OSError: there is no space for it.
@@ -42,14 +45,30 @@ class BlockFile:
         self._path = path
         path.unlink(missing_ok=True)
         size = HEAD + 8 * width * (2 + rows)
-        with path.open("x+b") as file:
-            allocate(file.fileno(), 0, size)  # a map of a file with holes ends the process when the disk is full
-            self._map = mmap.mmap(file.fileno(), size)
+        self._file: Any = path.open("x+b", buffering=0)
+        weakref.finalize(self, self._file.close)
+        self._row_bytes, self._reserved = 8 * width, 0
+        self.reserve(1)
+        self._file.truncate(size)
+        self._map = mmap.mmap(self._file.fileno(), size)
         numbers = np.frombuffer(self._map, np.float64, offset=HEAD)
         numbers[:width], numbers[width : 2 * width] = factors, offsets
         self.rows = numbers[2 * width :].reshape(rows, width)
         self.cells = memoryview(self._map)[:HEAD].cast("q")
         self.cells[WIDTH] = width
+
+    def reserve(self, rows: int) -> None:
+        """Have space set aside for so many rows: to fill a hole of a map ends the process where the disk is full.
+
+        Args:
+            rows: number of rows, at most those that there is room for.
+
+        Raises:
+            OSError: there is no space.
+        """
+        size = HEAD + self._row_bytes * (2 + rows)
+        allocate(self._file.fileno(), self._reserved, size - self._reserved)
+        self._reserved = max(size, self._reserved)
 
     @property
     def count_address(self) -> int:

@@ -33,17 +33,16 @@ class RowStream(Protocol):
 
     seconds: float
 
-    def open(self, dtype: np.dtype[np.void], rows: int) -> RowFile:
-        """The file for rows of this type, with space for so many.
+    def open(self, dtype: np.dtype[np.void]) -> RowFile:
+        """The file for rows of this type, with space for one.
 
         Args:
             dtype: type of a row: its columns.
-            rows: number of rows.
         """
         ...
 
     def block(self, rows: int) -> BlockFile:
-        """The block of so many rows that are not in the file yet.
+        """The block of at most so many rows that are not in the file yet.
 
         Args:
             rows: number of rows.
@@ -68,7 +67,8 @@ class Recorder:
             passed; in memory is then no more than a block.
 
     `count` is the number of rows that are kept. Of a stream the block is first one row and is doubled whenever it is
-    full, so that a run that dies at once leaves whole files as well.
+    full, so that a run that dies at once leaves whole files as well. Where the disk has no space for a block it takes
+    half of it, and so on, until there is none for a single row.
     """
 
     def __init__(
@@ -107,11 +107,11 @@ class Recorder:
     def _use_stream(self, stream: RowStream, room: int) -> None:
         """Keep rows where they outlive the process: in blocks of at most `room`, for which the disk reserves space."""
         self._limit = max(min(int(BLOCK // self._dtype.itemsize), self._limit, room), _FIRST_ROWS)
-        self._file = stream.open(self._dtype, self._limit)
+        self._file = stream.open(self._dtype)
         self._seconds, self._due = stream.seconds, monotonic() + stream.seconds
         self._block = stream.block(self._limit)
-        self._filled = self._block.cells
-        self._use(self._block.rows[:1])
+        self._filled, self._buffer = self._block.cells, self._block.rows
+        self._use(self._buffer[:1])
 
     @property
     def room(self) -> int:
@@ -214,7 +214,7 @@ class Recorder:
             self._flush()
         except OutputError:  # space was reserved, and the disk refuses all the same: the rest must fit into the memory
             return np.concatenate([np.asarray(self._file.table(self._dtype)), self._file.converted(self._in_memory())])
-        with suppress(OutputError):  # the next rows start behind these: it matters only if there are any
+        with suppress(OSError):  # the next rows start behind these: it matters only if there are any
             self._file.reserve(self.count + len(self._rows))
         return self._file.table(self._dtype)
 
@@ -261,16 +261,31 @@ class Recorder:
             more[: self.count] = self._rows
             self._use(more)
             return
-        block = max(int(BLOCK // self._dtype.itemsize), _FIRST_ROWS)
+        wanted = 2 * len(self._rows)
         if self._file is None:
-            self._file = RowFile(self._folder, self._dtype.itemsize, len(self._rows) + block)
-            self._flush()
-            self._use(np.empty((min(block, len(self._rows)), self._width)))
-        else:
-            self._file.reserve(self.count + len(self._rows))
-            self._flush()
-            if self._block is not None and len(self._rows) < self._limit:
-                self._use(self._block.rows[: 2 * len(self._rows)])
+            wanted = min(max(int(BLOCK // self._dtype.itemsize), _FIRST_ROWS), len(self._rows))
+            self._file = RowFile(self._folder, self._dtype.itemsize, len(self._rows))
+            self._buffer = np.empty((wanted, self._width))
+        self._flush()
+        self._use(self._buffer[: self._reserved(min(wanted, len(self._buffer)))])
+
+    def _reserved(self, wanted: int) -> int:
+        """For how many of the wanted rows the disk sets space aside.
+
+        Raises:
+            OutputError: for none.
+        """
+        assert self._file is not None
+        while True:
+            try:
+                self._file.reserve(self.count + wanted)
+                if self._block is not None:
+                    self._block.reserve(wanted)
+                return wanted
+            except OSError as error:
+                if wanted == 1:
+                    raise self._file.explained(error) from error
+            wanted //= 2
 
     def _flush(self) -> None:
         """Bring the block in memory into the file; only then it counts as being there."""

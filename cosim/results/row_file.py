@@ -45,9 +45,12 @@ class RowFile:
         try:
             self._file: Any = _file_without_name(self._folder) if named is None else _new_file(named)
         except OSError as error:
-            raise self._explained(error) from error
+            raise self.explained(error) from error
         weakref.finalize(self, self._file.close)  # the maps of the file live on
-        self.reserve(rows)
+        try:
+            self.reserve(rows)
+        except OSError as error:
+            raise self.explained(error) from error
 
     def reserve(self, rows: int) -> None:
         """Make sure that the file can hold so many rows.
@@ -56,13 +59,10 @@ class RowFile:
             rows: number of rows.
 
         Raises:
-            OutputError: there is no space for them.
+            OSError: there is no space for them.
         """
         size = self._offset + rows * self._row_bytes
-        try:
-            allocate(self._file.fileno(), self._reserved, size - self._reserved)
-        except OSError as error:
-            raise self._explained(error) from error
+        allocate(self._file.fileno(), self._reserved, size - self._reserved)
         self._reserved = max(size, self._reserved)
 
     def write(self, first: int, rows: np.ndarray) -> None:
@@ -80,7 +80,7 @@ class RowFile:
             while data:
                 data = data[self._file.write(data) or 0 :]
         except OSError as error:
-            raise self._explained(error) from error
+            raise self.explained(error) from error
         self.count = first + len(rows)
 
     def converted(self, rows: np.ndarray) -> np.ndarray:
@@ -101,7 +101,12 @@ class RowFile:
             return np.empty(0, dtype)
         return np.memmap(self._file, dtype=dtype, mode="r+", shape=(self.count,))
 
-    def _explained(self, error: OSError) -> OutputError:
+    def explained(self, error: OSError) -> OutputError:
+        """Why no more rows can be taken, in words.
+
+        Args:
+            error: of the file system.
+        """
         reason = error.strerror or str(error)
         return OutputError(
             f"The recording outgrew its memory and cannot continue on disk, in {self._folder}: {reason}. What was "

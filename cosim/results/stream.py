@@ -76,24 +76,23 @@ class Stream:
         self._block: BlockFile | None = None
         self._begin(summary)
 
-    def open(self, dtype: np.dtype[np.void], rows: int) -> RowFile:
-        """The file of the table, with space for so many rows.
+    def open(self, dtype: np.dtype[np.void]) -> RowFile:
+        """The file of the table, with space for a row.
 
         Args:
             dtype: type of a row: its columns.
-            rows: number of rows.
 
         Raises:
             OutputError: there is no space.
         """
-        self._file = _StreamFile(self.directory / usual_file("npy"), dtype, rows, self)
+        self._file = _StreamFile(self.directory / usual_file("npy"), dtype, self)
         return self._file
 
     def block(self, rows: int) -> BlockFile:
-        """The block of rows that are not in the table yet.
+        """The block of rows that are not in the table yet, with space for the first.
 
         Args:
-            rows: number of rows.
+            rows: number of rows, at most.
 
         Raises:
             OutputError: there is no space.
@@ -171,17 +170,17 @@ class Stream:
 class _StreamFile(RowFile):
     """The table of a stream: a NumPy file with its number of rows kept true."""
 
-    def __init__(self, path: Path, dtype: np.dtype[np.void], rows: int, stream: Stream) -> None:
+    def __init__(self, path: Path, dtype: np.dtype[np.void], stream: Stream) -> None:
         self._dtype, self._stream = dtype, stream
         self._synced = monotonic()
         self._broken: OSError | None = None
-        super().__init__(None, dtype.itemsize, rows, path, len(growing_header(dtype, 0)))
+        super().__init__(None, dtype.itemsize, 1, path, len(growing_header(dtype, 0)))
         self._make_whole()
 
     def reserve(self, rows: int) -> None:
         """As for any file of rows."""
         if self._broken is not None:
-            raise self._explained(self._broken) from self._broken
+            raise self._broken
         if not self._reserved:  # with its header the file is a table, of no row if there is no space for any
             with suppress(OSError):
                 self._file.write(growing_header(self._dtype, 0))
@@ -225,7 +224,8 @@ class _StreamFile(RowFile):
         except OSError as error:
             self._broken = error
 
-    def _explained(self, error: OSError) -> OutputError:
+    def explained(self, error: OSError) -> OutputError:
+        """As for any file of rows, with the number of those in it."""
         return OutputError(
             f"The run cannot be streamed to {self._folder} any further: {error.strerror or error}. "
             f"{f'The {self.count} rows up to there are kept' if self.count else 'No row was recorded'}. "
