@@ -8,21 +8,23 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
 from cosim.diagnostics.messages import read_messages, write_messages
 from cosim.errors import OutputError
 from cosim.results.block_file import BLOCK_FILE, read_block
+from cosim.results.formats.columns import check_time
 from cosim.results.formats.growing_npy import read_grown
 from cosim.results.formats.known_formats import FORMATS, check_formats, fastest_first, table_files, usual_file
 from cosim.results.record_rows import PACKET_ROWS, TELEGRAM_ROWS, Record, RecordRows
 from cosim.results.result_data import ResultData, SignalInfo
-from cosim.results.summary_file import read_summary, write_summary
+from cosim.results.summary_file import first_wrong, read_summary, write_summary
 from plant_models.left_behind import owned
 from plant_models.missing_package import is_installed
 
@@ -30,6 +32,20 @@ EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
 PACKETS = "packets.csv"  # of runs with a network
 REPORT, FIGURES = "report.html", "figures"
 LAYOUT = 1  # version of the layout of summary.json
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """What is relied on of the summary; there may be more."""
+
+    signals: list[SignalInfo]
+    summary: dict[str, Any]
+    failure: str | None
+    ended: bool = True
+
+
+_SHAPE = TypeAdapter(_Shape)
 
 
 def remove_report(directory: str | Path, keep: Collection[Path] = ()) -> None:
@@ -148,32 +164,53 @@ def write_results(result: ResultData, directory: str | Path, formats: Sequence[s
     return {kind: folder / name for kind, name in names.items()}
 
 
-def _table(folder: Path, name: str | None) -> np.ndarray:
-    """The table of a folder, from the file with that name or from the one that is read fastest."""
+def _part(path: Path, read: Callable[[Path], Part]) -> Part:
+    """What a file of the folder holds; what is wrong with it is said with its name, and the line that is no text."""
+    try:
+        return read(path)
+    except UnicodeDecodeError:
+        lines = path.read_bytes().split(b"\n")
+        line = next(k for k, part in enumerate(lines, start=1) if part.decode(errors="ignore").encode() != part)
+        raise ValueError(f"{path.name}: line {line} is not UTF-8") from None
+    except ValueError as error:
+        said = first_wrong(error) if isinstance(error, ValidationError) else str(error).removesuffix(".")
+        raise ValueError(said if path.name in said else f"{path.name}: {said}") from error
+
+
+def _table(folder: Path, name: str | None, signals: Sequence[SignalInfo]) -> np.ndarray:
+    """The table of a folder with these signals, from the file with that name or from the one that is read fastest."""
     present = [item for item in fastest_first() if (folder / usual_file(item.name)).exists()]
     named = [item for item in fastest_first() if usual_file(item.name) == name]
     readable = [item for item in present if item.package is None or is_installed(item.package)]
     chosen = next(iter([*named, *readable, *present]), FORMATS["csv"])
-    return chosen.read(folder / usual_file(chosen.name)).table
+    path = folder / usual_file(chosen.name)
+    table = _part(path, chosen.read).table
+    check_time(str(path), table["time"])
+    lost = [signal.name for signal in signals if signal.name not in (table.dtype.names or ())]
+    if lost:
+        raise ValueError(f"{SUMMARY} speaks of signal {lost[0]!r}, which {path.name} does not have")
+    return table
+
+
+def _stated(path: Path) -> dict[str, Any]:
+    """The summary with all that is relied on."""
+    content = read_summary(path)
+    if content.get("layout") != LAYOUT:
+        raise ValueError(f"it has layout {content.get('layout')!r}, this version reads layout {LAYOUT}")
+    return {**content, "signals": _SHAPE.validate_python(content).signals}
 
 
 def _read(folder: Path, table_name: str | None = None) -> tuple[ResultData, Mapping[str, Any]]:
-    content = read_summary(folder / SUMMARY)
-    if content.get("layout") != LAYOUT:
-        raise ValueError(f"{SUMMARY} has layout {content.get('layout')!r}, this version reads layout {LAYOUT}.")
-    if not isinstance(content["summary"], dict):
-        raise ValueError(f"{SUMMARY}: summary is no table; another program wrote it, or it was edited.")
-    signals = [SignalInfo(**signal) for signal in content["signals"]]
+    content = _part(folder / SUMMARY, _stated)
     if not content.get("ended", True):  # it was streamed here, and its program died
         rows, events, logged, sent = (folder / name for name in (usual_file("npy"), EVENTS, MESSAGES, PACKETS))
         return _read_unfinished(rows, events, logged, sent, content), content
-    table = _table(folder, table_name)
-    lost = [signal.name for signal in signals if signal.name not in (table.dtype.names or ())]
-    if lost:
-        raise ValueError(f"{SUMMARY} speaks of signal {lost[0]!r}, which the table does not have.")
-    messages = read_messages(folder / MESSAGES) if (folder / MESSAGES).exists() else []  # older results have none
-    packets = PACKET_ROWS.read(folder / PACKETS) if (folder / PACKETS).exists() else []
-    return ResultData(table, signals, TELEGRAM_ROWS.read(folder / EVENTS), messages=messages, packets=packets), content
+    table = _table(folder, table_name, content["signals"])
+    logged, sent = folder / MESSAGES, folder / PACKETS
+    messages = _part(logged, read_messages) if logged.exists() else []  # older results have none
+    packets = _part(sent, PACKET_ROWS.read) if sent.exists() else []
+    telegrams = _part(folder / EVENTS, TELEGRAM_ROWS.read)
+    return ResultData(table, content["signals"], telegrams, messages=messages, packets=packets), content
 
 
 def read_results(directory: str | Path, table: str | None = None) -> ResultData:
@@ -198,7 +235,9 @@ def read_results(directory: str | Path, table: str | None = None) -> ResultData:
     except OSError as error:
         raise OutputError(f"No complete result in {folder}: {_reason(error)}. Run the scenario again.") from error
     except (KeyError, TypeError, ValueError) as error:
-        raise OutputError(f"The result in {folder} cannot be read: {error}. Run the scenario again.") from error
+        raise OutputError(
+            f"The result in {folder} cannot be read: {str(error).removesuffix('.')}. Run the scenario again."
+        ) from error
 
 
 def _read_unfinished(table: Path, events: Path, messages: Path, packets: Path, content: dict[str, Any]) -> ResultData:
@@ -209,10 +248,9 @@ def _read_unfinished(table: Path, events: Path, messages: Path, packets: Path, c
     content["failure"] = f"{content['failure']} They " + (
         "are none." if reached is None else f"end at t = {reached:g} s."
     )
-    signals = [SignalInfo(**signal) for signal in content["signals"]]
-    logged = read_messages(messages) if messages.exists() else []
+    logged = _part(messages, read_messages) if messages.exists() else []
     sent = _whole_lines(packets, PACKET_ROWS) if packets.exists() else []
-    return ResultData(rows, signals, _whole_lines(events, TELEGRAM_ROWS), messages=logged, packets=sent)
+    return ResultData(rows, content["signals"], _whole_lines(events, TELEGRAM_ROWS), messages=logged, packets=sent)
 
 
 def _all_rows(table: Path) -> np.ndarray:

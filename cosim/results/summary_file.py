@@ -12,6 +12,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from fmus.tables.plain_data import jsonable
 
 _INFINITIES = {"inf": math.inf, "-inf": -math.inf}
@@ -58,3 +60,15 @@ def read_summary(path: str | Path) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise ValueError(f"{path} is not a summary: expected a JSON object, got {type(content).__name__}.")
     return {key: restored(value) for key, value in content.items()}
+
+
+def first_wrong(error: ValidationError) -> str:
+    """What is wrong with a table that was read, in words: where, and what was expected.
+
+    Args:
+        error: of the check of its shape.
+    """
+    first = error.errors(include_url=False)[0]
+    place = ".".join(map(str, first["loc"]))
+    what = f"'{place}' is missing" if first["type"] == "missing" else f"{place}: {first['msg']}"
+    return f"{what}; another program wrote it, or it was edited"

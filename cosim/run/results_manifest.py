@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from cosim.errors import ProvenanceError
+from cosim.results.summary_file import first_wrong
 from fmus.near_files import near_files
 
 MADE_FROM, MANIFEST, SCENARIO, FILES = "made_from", "manifest.json", "scenario.toml", "files"
@@ -169,10 +170,7 @@ def read_manifest(directory: str | Path) -> Manifest:
             )
         _SHAPE.validate_python(data)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(map(str, first["loc"]))
-        what = f"'{place}' is missing" if first["type"] == "missing" else f"{place}: {first['msg']}"
-        raise ProvenanceError(f"{file} cannot be read: {what}; another program wrote it, or it was edited.") from None
+        raise ProvenanceError(f"{file} cannot be read: {first_wrong(error)}.") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         if isinstance(error, ProvenanceError):
             raise

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from cosim.run.connections import parse_connections
 from cosim.run.described_components import describe_component
+from cosim.run.task import RunTask
 from cosim.simulation.scenario import Scenario
 from cosim.starter.inspected_fmu import inspect_fmu
 from cosim.starter.starter_roles import plant_roles
@@ -66,11 +67,13 @@ def _of_scenario(path: Path) -> Set[str]:
     scenario = Scenario.load(path)
     table = scenario.table()
     links = parse_connections(table.connections, scenario.where)
-    names = {
-        output
-        for name, component in table.components.items()
-        for output in describe_component(name, component, scenario.folder, scenario.where, links=links).names("output")
-    }
+    task = RunTask(table, scenario.name, scenario.folder, scenario.where)
+    with task.named_in_errors():
+        names = {
+            output
+            for name, component in table.components.items()
+            for output in describe_component(name, component, task.folder, task.where, links=links).names("output")
+        }
     for source, target, *_ in links:
         names |= {end.partition(".")[2] for end in (source, target)}
     names |= {BALISE} if table.balises is not None else set()

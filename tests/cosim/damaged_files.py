@@ -181,18 +181,19 @@ def change_archive(path: Path, chance: Random, suffixes: tuple[str, ...]) -> Non
             archive.writestr(member, content)
 
 
-def change_folder(folder: Path, chance: Random) -> None:
-    """A folder in which a file is a mutant, gone, a folder, or a link to itself."""
+def change_folder(folder: Path, chance: Random) -> Path:
+    """A folder in which a file is a mutant, gone, a folder, or a link to itself; which file."""
     path = chance.choice(sorted(p for p in folder.rglob("*") if p.is_file()))
     kind = chance.random()
     if kind < 0.8:
         change_file(path, chance)
-        return
+        return path
     path.unlink()
     if kind < 0.88:
         path.mkdir()
     elif kind < 0.94:
         path.symlink_to(path.name)
+    return path
 
 
 def copied(source: Path, target: Path) -> Path:

@@ -76,13 +76,14 @@ def check_time(source: str, time: np.ndarray) -> None:
         source: what to call the file in messages. time: of the rows [s], shape (rows,).
 
     Raises:
-        OutputError: it does, or it is NaN; the message names the row.
+        OutputError: it does, or it is no finite number; the message names the row.
     """
     for start in range(0, len(time), CHUNK):
         part = np.asarray(time[max(start - 1, 0) : start + CHUNK], np.float64)
-        bad = np.flatnonzero(np.isnan(part))
+        bad = np.flatnonzero(~np.isfinite(part))
         if len(bad):
-            raise OutputError(f"{source}: the time in row {max(start - 1, 0) + bad[0] + 1} is not a number (NaN).")
+            row = max(start - 1, 0) + int(bad[0]) + 1
+            raise OutputError(f"{source}: the time in row {row} is not a finite number, but {part[bad[0]]}.")
         back = np.flatnonzero(part[1:] < part[:-1])
         if len(back):
             at = int(back[0])

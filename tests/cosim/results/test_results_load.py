@@ -127,7 +127,7 @@ def test_dialects_agree(
         ("# nothing else\n", "is empty"),
         ("time;a\n0;1\n1;2;3\n", "line 3: expected 2 cells separated by semicolons, got 3"),
         ("time,a\n0,1\n2,1\n1,1\n", r"time goes backwards in row 3, from 2 to 1 s"),
-        ("time,a\n0,1\nnan,1\n", r"the time in row 2 is not a number"),
+        ("time,a\n0,1\nnan,1\n", r"the time in row 2 is not a finite number"),
         ("time,a,a\n0,1,2\n", "two different columns are called 'a'"),
         ("x,y\n0,1\n", "no column 'time'; columns: x, y"),
         ("time [m],y\n0,1\n", "unit of time 'm'"),
