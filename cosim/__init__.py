@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from cosim.run.outcome import Outcome
     from cosim.scenario.shipped import shipped_scenarios
     from cosim.simulation.scenario import Scenario
-    from cosim.studies.sampling_plans import log_uniform, uniform, whole
+    from cosim.studies.distributions import log_uniform, uniform, whole
     from cosim.studies.sweep import Sweep
     from cosim.studies.sweep_result import SweepResult
     from cosim.tuning.tune import tune
@@ -70,12 +70,12 @@ __getattr__, __dir__ = lazy_imports(
         "benchmark_observers": "cosim.choice.benchmark",
         "compare": "cosim.comparison.compare",
         "load_result": "cosim.results.load_result",
-        "log_uniform": "cosim.studies.sampling_plans",
+        "log_uniform": "cosim.studies.distributions",
         "rerun": "cosim.provenance",
         "save_result": "cosim.results.save",
         "shipped_scenarios": "cosim.scenario.shipped",
         "tune": "cosim.tuning.tune",
-        "uniform": "cosim.studies.sampling_plans",
-        "whole": "cosim.studies.sampling_plans",
+        "uniform": "cosim.studies.distributions",
+        "whole": "cosim.studies.distributions",
     },
 )

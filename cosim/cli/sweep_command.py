@@ -17,7 +17,8 @@ from cosim.errors import ScenarioError, nearest
 from cosim.results.results_folder import FIGURES, check_writable
 from cosim.scenario.override import CASE
 from cosim.simulation.scenario import Scenario
-from cosim.studies.sampling_plans import MOST, Range, uniform
+from cosim.studies.distributions import Range, uniform
+from cosim.studies.sampling_plans import MOST
 from cosim.studies.sweep import Sweep
 from cosim.studies.sweep_files import write_figures
 from cosim.studies.warnings_of_runs import PAGE, counted, warning_lines

@@ -34,7 +34,8 @@ from plant_models.code_trust import is_looking, looking
 
 if TYPE_CHECKING:
     from cosim.components.recording_data import Interpolation
-    from cosim.studies.sampling_plans import Mode, Range
+    from cosim.studies.distributions import Distribution
+    from cosim.studies.sampling_plans import Mode
     from cosim.studies.sweep import Sweep
 
 LOG = logging.getLogger("cosim")
@@ -206,7 +207,7 @@ class Scenario(StatedScenario, FirstScreen):
 
     def vary(
         self,
-        values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]],
+        values: Mapping[str, Iterable[Any] | Distribution] | Sequence[Mapping[str, Any]],
         mode: Mode = "grid",
         *,
         count: int | None = None,
@@ -224,9 +225,9 @@ class Scenario(StatedScenario, FirstScreen):
             values: names as for `set`, each with the values it takes; or a list of variations, each a mapping of names
                 to values.
             mode: ``grid``: every combination, the last name changes quickest; ``zip``: first with first, second with
-                second; ``latin`` (Latin hypercube) and ``random``: `count` points of
-                `cosim.studies.sampling_plans.uniform` ranges and lists.
-            count: number of points, for ``latin`` and ``random``. seed: of the points.
+                second; ``latin`` (Latin hypercube), ``sobol`` and ``random``: `count` points of
+                `cosim.studies.distributions.uniform` ranges and lists.
+            count: number of points, for ``latin``, ``sobol`` and ``random``. seed: of the points.
 
         Raises:
             ScenarioError: a name or a value cannot be; nothing has been run then.

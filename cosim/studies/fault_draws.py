@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cosim.run.component_models import make_system
 from cosim.runs.runnable import RunnableScenario
-from cosim.studies.sampling_plans import Range, uniform
+from cosim.studies.distributions import Range, uniform
 from plant_models.faults.fault_system import FaultSystem
 from plant_models.hybrid.signal import scalar_names
 

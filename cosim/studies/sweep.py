@@ -21,8 +21,9 @@ from cosim.runs.keys import code_content
 from cosim.runs.run import Run, whole
 from cosim.runs.runnable import RunnableScenario
 from cosim.scenario.override import CASE
+from cosim.studies.distributions import Distribution
 from cosim.studies.measures import Measure, error_measures, own_measures, setting_text
-from cosim.studies.sampling_plans import Mode, Range, Variation, variations
+from cosim.studies.sampling_plans import Mode, Variation, variations
 from cosim.studies.sweep_files import MOST_PAGES, run_folder, write_index, write_outcome
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun
@@ -225,7 +226,7 @@ def _apart(jobs: Sequence[Run]) -> bool:
 
 def make_sweep(
     scenario: RunnableScenario,
-    values: Mapping[str, Iterable[Any] | Range] | Sequence[Mapping[str, Any]],
+    values: Mapping[str, Iterable[Any] | Distribution] | Sequence[Mapping[str, Any]],
     mode: Mode,
     count: int | None,
     seed: int,

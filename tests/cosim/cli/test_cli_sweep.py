@@ -13,7 +13,7 @@ from cosim.cli import main
 from cosim.cli.sweep_command import parse_values
 from cosim.errors import ScenarioError
 from cosim.results.results_folder import read_results
-from cosim.studies.sampling_plans import uniform
+from cosim.studies.distributions import uniform
 
 
 @pytest.fixture

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim.errors import ScenarioError
-from cosim.studies.sampling_plans import log_uniform, uniform, variations, whole
+from cosim.studies.distributions import log_uniform, uniform, whole
+from cosim.studies.sampling_plans import variations
 
 LISTS = st.dictionaries(st.sampled_from("abc"), st.lists(st.integers(), min_size=1, max_size=4), min_size=1)
 

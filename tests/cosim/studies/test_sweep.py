@@ -20,9 +20,9 @@ from cosim.report.live.live_page import PageVerdict
 from cosim.results.results_folder import read_results
 from cosim.run.outcome import Outcome
 from cosim.runs.journal import JOURNAL, read_lines
+from cosim.studies.distributions import uniform
 from cosim.studies.live_sweep import sweep_page
 from cosim.studies.measures import UNMET
-from cosim.studies.sampling_plans import uniform
 from cosim.studies.seed_runs import seed_study
 from cosim.studies.sweep_files import write_index
 from cosim.studies.sweep_result import SweepResult
