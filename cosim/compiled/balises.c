@@ -396,6 +396,37 @@ static bool is_single(const Balises *balises, double until) {
     return !balises->by_instant || following >= balises->instant_count || balises->instants[following] > until;
 }
 
+/* A step begins of which all calls are noted. */
+static void begin_noted(Program *program, double t) {
+    for (int64_t i = 0; i < program->slave_count; i++) {
+        program->slaves[i].calls_here = program->slaves[i].returns_here = 0;
+        program->slaves[i].now = t;
+        program->slaves[i].left_here = *program->slaves[i].left_at;
+    }
+    begin_step(program);
+    program->journal.count = program->journal.used = 0;
+    program->journal.on = 1;
+}
+
+/* Such a step is Python's: the values are those at its start. */
+static bool taken_back(Program *program) {
+    memcpy(program->values, start_of(program), (size_t)program->value_count * sizeof(double));
+    for (int64_t i = 0; i < program->slave_count; i++)
+        *program->slaves[i].left_at = program->slaves[i].left_here;
+    return stopped(program, STOP_HANDED, 0, 0);
+}
+
+/* Such a step is done. */
+static void count_noted(Program *program) {
+    for (int64_t i = 0; i < program->slave_count; i++) {
+        if (program->slaves[i].calls_here == 0)
+            continue;
+        program->slaves[i].calls++;
+        program->slaves[i].more_calls += program->slaves[i].calls_here - 1;
+        program->slaves[i].returns += program->slaves[i].returns_here;
+    }
+}
+
 /* Do such a step with its rows of events, at most two. Returns their number, or -1 where it is Python's: all of it (STOP_NEAR), or
    after what is in the journal (STOP_HANDED). */
 static int64_t step_over(Program *program, double t, double until, double *rows, int64_t room) {
@@ -410,28 +441,14 @@ static int64_t step_over(Program *program, double t, double until, double *rows,
         .t = t,
         .until = until,
     };
-    for (int64_t i = 0; i < program->slave_count; i++) {
-        program->slaves[i].calls_here = program->slaves[i].returns_here = 0;
-        program->slaves[i].now = t;
-        program->slaves[i].left_here = *program->slaves[i].left_at;
-    }
-    begin_step(program);
-    program->journal.count = program->journal.used = 0;
-    program->journal.on = 1;
+    begin_noted(program, t);
     bool ordinary = move_all(&over);
     program->journal.on = 0;
     if (!ordinary) {
-        memcpy(program->values, start_of(program), (size_t)program->value_count * sizeof(double));
-        for (int64_t i = 0; i < program->slave_count; i++)
-            *program->slaves[i].left_at = program->slaves[i].left_here;
-        stopped(program, STOP_HANDED, 0, 0);
+        taken_back(program);
         return -1;
     }
-    for (int64_t i = 0; i < program->slave_count; i++) {
-        program->slaves[i].calls++;
-        program->slaves[i].more_calls += program->slaves[i].calls_here - 1;
-        program->slaves[i].returns += program->slaves[i].returns_here;
-    }
+    count_noted(program);
     stopped(program, STOP_DONE, 0, 0);
     balises->steps++;
     if (!over.found)

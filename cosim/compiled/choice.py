@@ -9,6 +9,7 @@ from cosim.compiled.program import NotCompilable
 from cosim.errors import CouplingError
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
+from cosim.master.control.fixed import FixedStep
 from cosim.master.stepper import StepperChoice, Wanted, python_stepper
 
 
@@ -24,6 +25,7 @@ def choose_stepper(wanted: Wanted, control: StepControl, axis: TimeAxis) -> Step
     if wanted == "python":
         return python_stepper(control, axis)
     try:
+        _check(control)
         return StepperChoice(wanted, CompiledStepper(control, axis))
     except NotCompilable as error:
         if wanted == "compiled":
@@ -32,3 +34,12 @@ def choose_stepper(wanted: Wanted, control: StepControl, axis: TimeAxis) -> Step
                 f"numbers."
             ) from error
         return StepperChoice(wanted, reason=str(error))
+
+
+def _check(control: StepControl) -> None:
+    """Raise where the stepper can do no step of a run, whatever its components are."""
+    if type(control) is not FixedStep:
+        raise NotCompilable(f"the step control '{control.name}' is Python's")
+    algorithm = control.system.algorithm
+    if algorithm.name not in ("gauss-seidel", "jacobi") or getattr(algorithm, "threads", 1) != 1:
+        raise NotCompilable(f"the algorithm '{algorithm.name}' is Python's")

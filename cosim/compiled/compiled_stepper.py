@@ -9,8 +9,7 @@ meets: then the Python stepper finishes the step from where it stands.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping, Sequence
 from functools import partial
 from operator import attrgetter
 from time import perf_counter
@@ -18,21 +17,21 @@ from typing import Any
 
 from cosim.balises.recorded import RecordedLocaliser
 from cosim.balises.rollback import RollbackLocaliser
+from cosim.compiled.coordination import Coordination, Parts
 from cosim.compiled.crossings import Crossings
 from cosim.compiled.library import load_stepper
 from cosim.compiled.notifying import CompiledDelivery, can_be_notified
 from cosim.compiled.program import NotCompilable, Program, Stop
-from cosim.compiled.recorded_returns import RecordedReturn, repeated
-from cosim.compiled.recordings import follows_recordings
+from cosim.compiled.recorded_returns import RecordedReturn, Repetition
+from cosim.compiled.turns import Turns, stands
 from cosim.components.component import Component
-from cosim.components.recording import RecordingSlave
 from cosim.coupling.chain import COMPILED_STAGE_TEXT, Mover, Position, Stage
 from cosim.coupling.plan import Plan
 from cosim.coupling.planned import PlannedComponent
 from cosim.diagnostics.sampled_times import typical_seconds
 from cosim.master.axis import TimeAxis
 from cosim.master.control.control import StepControl
-from cosim.master.control.fixed import FixedStep
+from cosim.master.events.coordinator import EventCoordinator
 from cosim.master.stepper import Chunk
 from cosim.master.system import NO_ROWS, Row, System
 from cosim.results.recorder import Recorder
@@ -49,7 +48,7 @@ GROWTH = 8
 ROWS_OF_EVENTS = 64
 """Room for those in a chunk that may hold some; where it is not enough, the chunk is shorter."""
 
-WITHIN = frozenset({Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.ARRIVE, Stop.CROSSED})
+WITHIN = frozenset({Stop.REFUSED, Stop.WRITE, Stop.STEP, Stop.READ, Stop.ARRIVE, Stop.CROSSED, Stop.TURN, Stop.EVENTS})
 """The chunk ended within a step, at one of the slaves."""
 
 STEPPED = frozenset({Stop.STEP, Stop.READ, Stop.ARRIVE, Stop.CROSSED})
@@ -67,34 +66,42 @@ class CompiledStepper:
         control: the step control of the run, through which Python does the other steps.
         axis: communication points.
 
-    `steps` counts what it did.
+    `steps` counts what it did, `in_python` says of each component that Python moves in them why.
 
     Raises:
-        NotCompilable: why it cannot.
+        NotCompilable: why it cannot do any.
     """
 
     def __init__(self, control: StepControl, axis: TimeAxis) -> None:
         self.control, self.axis = control, axis
         self.system: System = control.system
         self.plan: Plan = self.system.plan
-        self.steps = 0
+        self.steps, self._seconds, self._share_of_steps = 0, 0.0, 0.0
         self._components = [step.component for step in self.plan.steps]
         self._moves = [{"get": 0, "set": 0} for _ in self.plan.steps]
         self._longest = 1
-        _check(control, self.system)
         self._library = _load()
-        self._program = Program(self.plan, axis, self._library)
-        self._program.head.seconds_at_most = SECONDS
-        self._address = self._program.address
-        self._repeating = False
-        for place, step in enumerate(self.plan.steps):
+        self._program = program = Program(self.plan, axis, self._library)
+        program.head.seconds_at_most = SECONDS
+        self.in_python = {self._components[place].name: why for place, why in program.in_python.items()}
+        self._address = program.address
+        self._turns = Turns(
+            program.head, self.plan, axis, list(program.in_python), at_once=self.system.algorithm.name == "jacobi"
+        )
+        self._own = [place for place in range(len(self.plan.steps)) if place not in program.in_python]
+        self._with_events, self._coordination = self._watch_events()
+        self._plain = not any(bool(slave.special) for slave in program.slaves)
+        self._repetition = Repetition([component.slave for component in self._components])
+        self._crossings = self._watch_balises()
+        for place in self._own:
+            step = self.plan.steps[place]
             if step.interpolator is None:
                 self._quicken(place, step)
-        self._crossings = self._watch_balises()
+            step.component.clock = partial(self._time_in_chunk, place, step.component)
         self._first: int | None = None
         self._stops_at_packets = False
-        for place, step in enumerate(self.plan.steps):
-            step.component.clock = partial(self._time_in_chunk, place, step.component)
+        if self._parts is not None:
+            self.system.shortcut = self._part
 
     def run(self, k: int, recorder: Recorder) -> Chunk:
         """Do steps from number `k` on.
@@ -102,8 +109,9 @@ class CompiledStepper:
         Raises:
             OutputError: the recorder takes no more rows.
         """
-        own_crossings = self._crossings is not None and self._crossings.allow(recorder.every == 1)
-        self._stops_at_packets = recorder.every == 1
+        alone = self._plain and self._coordination is None
+        own_crossings = self._crossings is not None and self._crossings.allow(recorder.every == 1 and alone)
+        self._stops_at_packets = recorder.every == 1 and self._coordination is None
         free = self._free_steps(k)
         if free < 1:
             return Chunk(0, partial(self._whole_step, k))
@@ -116,7 +124,9 @@ class CompiledStepper:
         done = int(run(self._address, k, k + wanted, rows.__array_interface__["data"][0], len(rows)))
         self._first = None
         recorder.commit(int(head.rows_done))
-        self.steps += done
+        stop = _STOPS[head.stop]
+        self.steps += done + (stop is Stop.EVENTS)
+        self._seconds += head.seconds
         if self._crossings is not None:
             self._crossings.collect()
         self._set_times(k + done)
@@ -125,7 +135,7 @@ class CompiledStepper:
         if done:
             fitting = int(self._longest * SECONDS / max(head.seconds, 1e-9))
             self._longest = max(1, min(fitting, GROWTH * self._longest, LONGEST))
-        return self._ended(k, done, _STOPS[head.stop])
+        return self._ended(k, done, stop)
 
     def _ended(self, k: int, done: int, stop: Stop) -> Chunk:
         if stop in (Stop.DONE, Stop.TIME):
@@ -153,8 +163,10 @@ class CompiledStepper:
         it.
         """
         free, balises = self.axis.count - k, self.system.balises
-        limit = min(map(_NEXT_EVENT, self._components), default=NEVER)
+        limit = min(map(_NEXT_EVENT, self._with_events), default=NEVER)
         if any(map(_TERMINATED, self._components)):
+            return 0
+        if self._coordination is not None and not self._coordination.begin(self.axis[k]):
             return 0
         if balises is not None:
             limit = min(limit, balises.idle_until)
@@ -197,32 +209,58 @@ class CompiledStepper:
 
     def _step_again(self, k: int, said: Mapping[int, Mapping[str, Sequence[RecordedReturn]]]) -> Sequence[Row]:
         """The whole of step `k`, of which the stepper has done a part: the slaves repeat what they said."""
-        with self._repeated(said):
+        with self._repetition.of(said):
             return self._whole_step(k)
 
     def _rest_of_step(self, k: int) -> Sequence[Row]:
         """What is left of step `k` once the stepper, which has begun it, has left it at one of the slaves."""
-        t, until, balises, first = self.axis[k], self.axis[k + 1], self.system.balises, int(self._program.head.slave)
+        t, until, first = self.axis[k], self.axis[k + 1], int(self._program.head.slave)
+        if self._events is not None:
+            self._events.go_on(until)
+        rows = self._rest(t, until, first, _STOPS[self._program.head.stop])
+        return rows if self._events is None else self._events.end(until, rows)
+
+    def _rest(self, t: float, until: float, first: int, stop: Stop) -> Sequence[Row]:
+        """What is left of the way from `t` to `until` [s] that the stepper has left at place `first`."""
+        balises = self.system.balises
+        if stop is Stop.TURN:
+            self._turns.raise_failure()
         if balises is not None:
             balises.begin(t, until)
         for place, step in enumerate(self.plan.steps[first:]):
-            if place == 0:
+            if place > 0:
+                step.step(t, until)
+            elif stop is not Stop.TURN:  # else it has been moved
                 if step.interpolator is not None:
                     step.prepare(t, until)
                 self._repeated_move(step.move, t, until)
-            else:
-                step.step(t, until)
-        rows = NO_ROWS if balises is None else balises.rows()
-        return [*rows, *self._packets_at_end(until)]
+        return NO_ROWS if balises is None else balises.rows()
 
-    def _packets_at_end(self, t: float) -> Sequence[Row]:
-        """What is sent or arrives at the end of a step that the stepper has left, and the row before it."""
-        network, values = self.system.network, self.plan.values
-        if network is None or not network.is_due(t):
-            return NO_ROWS
-        before = values.copy()
-        network.handle(t)
-        return [(t, before)] if before.tobytes() != values.tobytes() else NO_ROWS
+    def _part(self, t: float, until: float) -> Sequence[Row] | None:
+        """Bring the system from `t` to `until` [s] where nothing is due on the way; None where Python must."""
+        if self._repetition.active or self._parts is None or not self._parts.may_begin(t, until):
+            return None
+        if self._crossings is not None:
+            if self._crossings.recorded and self._crossings.idle_until <= until + 2.0 * TIME_TOLERANCE:
+                return None
+            self._crossings.allow(self._plain)
+        head = self._program.head
+        rows = int(self._library.stepper_part(self._address, t, until, self._parts.rows.ctypes.data))
+        self._seconds += head.seconds
+        if rows < 0 and head.stop == Stop.NEAR:
+            return None
+        if rows < 0 and head.stop == Stop.HANDED:
+            with self._repetition.of(self._program.journalled()):
+                return self.system.move(t, until)
+        first = len(self._components) if rows >= 0 else int(head.slave)
+        for place in self._own:
+            self._components[place].time = until if place < first else t
+        self._forget_repeated()
+        if rows < 0:
+            return self._rest(t, until, first, _STOPS[head.stop])
+        if self._crossings is not None:
+            self._crossings.collect()
+        return [(float(row[0]), row[1:].copy()) for row in self._parts.rows[:rows]]
 
     def _quicken(self, place: int, step: PlannedComponent) -> None:
         """In the steps that are Python's a component still moves by one call into the stepper."""
@@ -230,7 +268,7 @@ class CompiledStepper:
         call, address = self._library.stepper_move, self._address
 
         def move(reads: bool, slowly: Mover, t: float, until: float) -> None:
-            if self._repeating or component.next_event <= until + 2.0 * TIME_TOLERANCE:
+            if self._repetition.active or component.next_event <= until + 2.0 * TIME_TOLERANCE:
                 slowly(t, until)
                 return
             begin = perf_counter()
@@ -246,6 +284,21 @@ class CompiledStepper:
         drive, advance = partial(partial, move, True), partial(partial, move, False)
         step.add_stage(Stage(Position.COMPILED, COMPILED_STAGE_TEXT, drive=drive, advance=advance))
 
+    def _watch_events(self) -> tuple[list[Component], Coordination | None]:
+        """The components whose events known beforehand end a chunk, and what is to be known of those that concern
+        others.
+        """
+        self._events: EventCoordinator | None = getattr(self.system, "events", None)
+        self._parts: Parts | None = None
+        own = [self._components[place] for place in self._own]
+        if self._events is None:
+            return own, None
+        if all(step.every == 1 and step.interpolator is None for step in self.plan.steps):
+            self._parts = Parts(self._components, self.system, self._events)
+        taking_part = [p.component for p in self._events.participants if p.component not in own]
+        wanted = self.system.meets_events
+        return own + taking_part, Coordination(self._program, self.plan, self._events) if wanted else None
+
     def _watch_balises(self) -> Crossings | None:
         """The stepper knows of the balises; receivers that allow it are stepped through a telegram by one call into
         it.
@@ -256,54 +309,50 @@ class CompiledStepper:
         if not isinstance(service.localiser, RollbackLocaliser | RecordedLocaliser):
             raise NotCompilable(f"balises are localised by '{service.localiser.method}'")
         names, deliveries = [step.component.name for step in self.plan.steps], {}
+        if (reason := self._program.in_python.get(names.index(service.plant))) is not None:
+            raise NotCompilable(f"its balises are looked for, and {reason}")
         for receiver in service.receivers:
             place = names.index(receiver.planned.component.name)
-            if can_be_notified(receiver, place, self._program):
-                idle = lambda: not self._repeating  # noqa: E731 - one word of state
-                deliveries[place] = CompiledDelivery(
-                    receiver, place, self._program, self._library, self._repeated, idle
-                )
+            if place not in self._program.in_python and can_be_notified(receiver, place, self._program):
+                deliveries[place] = CompiledDelivery(receiver, place, self._program, self._library, self._repetition)
                 receiver.compiled = deliveries[place].step
         return Crossings(self._program, self.plan, self.axis, service, deliveries)
 
     def _repeated_move(self, move: Mover, t: float, until: float) -> None:
         """Move a component in Python that the stepper has moved in part."""
         head = self._program.head
-        with self._repeated({int(head.slave): self._program.said(head.slave, Stop(head.stop))}):
+        with self._repetition.of({int(head.slave): self._program.said(head.slave, Stop(head.stop))}):
             move(t, until)
-
-    @contextmanager
-    def _repeated(self, responses: Mapping[int, Mapping[str, Sequence[RecordedReturn]]]) -> Iterator[None]:
-        """Python is at work on a step that the stepper has begun: slaves repeat themselves, and nobody calls the
-        stepper.
-        """
-        self._repeating = True
-        try:
-            with ExitStack() as stack:
-                for place, said in responses.items():
-                    slave = self.plan.steps[place].component.slave
-                    if not isinstance(slave, RecordingSlave):  # which goes to any time, whatever it was asked before
-                        stack.enter_context(repeated(slave, said))
-                yield
-        finally:
-            self._repeating = False
 
     def _set_times(self, k: int) -> None:
         """Where the components stand after a chunk that ended in step number `k`; one call there is Python's to
         count.
         """
-        head, t = self._program.head, self.axis[k]
-        for step in self.plan.steps:
-            step.component.time = t
-        if head.stop in WITHIN:
-            for step in self.plan.steps[: head.slave]:
-                step.component.time = self.axis[k + 1]
-            if head.stop in STEPPED:  # Python counts them when they are repeated
-                self._program.slaves[head.slave].calls -= 1
-                self._program.slaves[head.slave].returns -= head.return_count
+        head, within = self._program.head, self._program.head.stop in WITHIN
+        for place in self._own:
+            step = self.plan.steps[place]
+            step.component.time = stands(step, self.axis, k + 1 if within and place < head.slave else k)
+        self._forget_repeated()
+
+    def _forget_repeated(self) -> None:
+        """Calls that Python repeats are counted there."""
+        head = self._program.head
+        if head.stop in STEPPED:
+            self._program.slaves[head.slave].calls -= 1
+            self._program.slaves[head.slave].returns -= head.return_count
+
+    def summary(self, stepping: float) -> dict[str, Any]:
+        """Once it is closed, the ``share`` of the calls of doStep and of the seconds of stepping that were its own.
+
+        Args:
+            stepping: what all steps took [s].
+        """
+        seconds = self._seconds / stepping if stepping > 0.0 else None
+        return {"share": {"steps": self._share_of_steps, "seconds": seconds}}
 
     def close(self) -> None:
         """Add what was done here to the counters of the components."""
+        done = 0
         if self._crossings is not None:
             self._crossings.close()
         for place, (step, slave, moves) in enumerate(
@@ -313,7 +362,8 @@ class CompiledStepper:
                 step.component.call_statistics[kind].add(0.0, count)
                 moves[kind] = 0
             component, calls, over = step.component, slave.calls + slave.all_calls, self._program.head.balises.steps
-            component.calls += calls + slave.more_calls + slave.returns
+            here = int(calls + slave.more_calls + slave.returns)
+            done, component.calls = done + here, component.calls + here
             for kind in ("get", "set") if len(step.inputs) else ("get",):
                 component.call_statistics[kind].add(
                     0.0, calls + slave.more_calls
@@ -322,6 +372,10 @@ class CompiledStepper:
             component.seconds += slave.seconds_over
             component.seconds += max(calls - over, 0) * typical_seconds(slave.sampled_calls, slave.sampled_seconds)
             slave.calls = slave.all_calls = slave.more_calls = slave.returns = 0
+        self._share_of_steps = done / max(sum(c.calls for c in self._components), 1)
+        self._seconds -= self._turns.seconds
+        if self._coordination is not None:
+            self._coordination.close(self.steps)
 
 
 def _load() -> Any:
@@ -329,30 +383,3 @@ def _load() -> Any:
         return load_stepper()
     except (CompilerMissing, CompilationError, OSError) as error:
         raise NotCompilable(f"the stepper cannot be compiled here: {error}") from error
-
-
-def _check(control: StepControl, system: System) -> None:
-    if type(control) is not FixedStep:
-        raise NotCompilable(f"the step control '{control.name}' is Python's")
-    if system.meets_events:
-        raise NotCompilable("events of the components are propagated")
-    algorithm = system.algorithm
-    if algorithm.name not in ("gauss-seidel", "jacobi") or getattr(algorithm, "threads", 1) != 1:
-        raise NotCompilable(f"the algorithm '{algorithm.name}' is Python's")
-    for step in system.plan.steps:
-        if step.inputs.gated and len(step.inputs):
-            raise NotCompilable(f"inputs of {step.component.name} are sent by something in Python")
-        if any(stage.position not in (Position.BALISES, Position.COMPILED) for stage in step.stages):
-            raise NotCompilable(f"{step.component.name} is moved by something in Python")
-        if step.inputs.non_numeric is not None:
-            raise NotCompilable(
-                f"inputs of {step.component.name} are no doubles: {', '.join(step.inputs.non_numeric.names)}"
-            )
-        if step.inputs.non_numeric is not None or len(system.plan.non_numeric):
-            raise NotCompilable("values that are no doubles are passed on")
-        if step.inputs.tables:
-            raise NotCompilable(f"inputs of {step.component.name} are mapped by tables of values")
-        if step.interpolator is not None and not follows_recordings(step.interpolator):
-            raise NotCompilable(f"inputs of {step.component.name} follow lines between communication points")
-        if step.substeps != 1:
-            raise NotCompilable(f"{step.component.name} takes {step.substeps} steps for one")

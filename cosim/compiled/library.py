@@ -15,6 +15,7 @@ from plant_models.disk_cache.folder import cache_folder
 
 SOURCES = (
     "stepper.c",
+    "turns.c",
     "balises.c",
     "notifying.c",
     "slave.c",
@@ -57,6 +58,8 @@ def _loaded(path: Path) -> ctypes.CDLL:
     ]
     library.stepper_move.restype = ctypes.c_int64
     library.stepper_move.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_int64]
+    library.stepper_part.restype = ctypes.c_int64
+    library.stepper_part.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_void_p]
     library.stepper_deliver.restype = ctypes.c_int64
     library.stepper_deliver.argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p]
     return library

@@ -6,8 +6,7 @@ What is not ordinary is finished by the receiver's own Python, which is handed w
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from time import perf_counter
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 from cosim.balises.delivery import OUTCOMES, Delivery, Receiver, snapped
 from cosim.balises.telegram import PAYLOAD
 from cosim.compiled.program import Program
-from cosim.compiled.recorded_returns import RecordedReturn
+from cosim.compiled.recorded_returns import Repetition
 from cosim.components.component import Component
 from cosim.results.result import BaliseRecord
 from fmu_observer.event_protocol import OUTCOME_VARIABLES
@@ -27,7 +26,6 @@ FUNCTIONS = ("fmi3EnterEventMode", "fmi3SetClock", "fmi3SetFloat64", "fmi3Update
 FIELDS = ("position", "location_accuracy", "odometer_reading", "delivered_at", "stamp")  # in the order of `stepper.h`
 OUTCOMES_AT_MOST = 8
 FMI3 = 3
-Repeating = Callable[[Mapping[int, Mapping[str, Sequence[RecordedReturn]]]], AbstractContextManager[None]]
 
 
 class _CTelegram(ctypes.Structure):
@@ -54,8 +52,7 @@ class CompiledDelivery:
     Args:
         receiver: see `can_be_notified`. place: of its component in the plan. program: the plan in C.
         library: the stepper.
-        repeating: context in which slaves give answers and nothing calls the stepper. idle: whether it may be called
-            now.
+        repetition: the time in which slaves repeat what they said.
     """
 
     def __init__(
@@ -64,11 +61,10 @@ class CompiledDelivery:
         place: int,
         program: Program,
         library: Any,
-        repeating: Repeating,
-        idle: Callable[[], bool],
+        repetition: Repetition,
     ) -> None:
         self.receiver, self.place, self.program = receiver, place, program
-        self._repeating, self._idle = repeating, idle
+        self._repetition = repetition
         self.component = receiver.planned.component
         self._port = port = self.component.events[receiver.event]
         self._names = [name for name in port.payload if name in PAYLOAD] + ["stamp"] * (port.stamp is not None)
@@ -113,7 +109,7 @@ class CompiledDelivery:
             t: start of the step [s]. until: end of the step [s]. telegrams: to be delivered in it.
         """
         receiver, component = self.receiver, self.component
-        if len(telegrams) != 1 or receiver.busy or component.next_event != NEVER or not self._idle():
+        if len(telegrams) != 1 or receiver.busy or component.next_event != NEVER or self._repetition.active:
             return self._slowly(t, until, telegrams)
         notified_at = snapped(telegrams[0].delivered_at, t, until)
         self._times[0], self._times[1], self._times[2] = t, notified_at, until
@@ -121,7 +117,7 @@ class CompiledDelivery:
         self.begin()
         begin = perf_counter()
         if not self._call(*self._arguments):
-            with self._repeating(self.program.journalled()):
+            with self._repetition.of(self.program.journalled()):
                 return self._slowly(t, until, telegrams)
         before, after = self._before.copy(), self._after.copy()
         component.time, component.calls = until, component.calls + (notified_at > t) + (until > notified_at)

@@ -18,6 +18,7 @@ from cosim.compiled.journal import StepperCall, StepperJournal
 from cosim.compiled.recorded_returns import RecordedReturn
 from cosim.compiled.recordings import FollowedInputs, NativeRecording
 from cosim.compiled.structures import CPlantMonitor, CPort, CProgram, CSlave
+from cosim.compiled.turns import reason_for_python
 from cosim.components.component import Component
 from cosim.components.recording import RecordingSlave
 from cosim.components.recording_data import Recording
@@ -30,7 +31,6 @@ from cosim.process.last_call import LAST_CALL
 from fmus.exchange.slave import solver_of
 from fmus.fmi.call_warnings import CONTRADICTIONS
 from fmus.fmi.elements import Element
-from fmus.fmi.ports import is_native
 from fmus.fmi.types import CTYPES, c_type, getter_type, size
 
 FMI3 = 3
@@ -53,6 +53,8 @@ class Stop(IntEnum):
     SENT = 9  # in Python only: the inputs were sent, and no more was to be done
     ARRIVE = 10
     HANDED = 11
+    TURN = 12
+    EVENTS = 13
 
 
 class NotCompilable(CosimError):  # noqa: N818 - no error unless somebody demanded the compiled stepper
@@ -67,10 +69,10 @@ class Program:
         axis: communication points. library: the stepper, which plays recordings back itself.
 
     Attributes `head` and `slaves` are the structures; `writes` and `reads` the names of the functions of each slave's
-    ports.
+    ports; `in_python` says of the components that Python moves why, by their places in the plan.
 
     Raises:
-        NotCompilable: something in the plan has no place in it; it is named.
+        NotCompilable: Python must move all of them; why.
     """
 
     def __init__(self, plan: Plan, axis: TimeAxis, library: Any) -> None:
@@ -81,11 +83,14 @@ class Program:
             if isinstance(step.component.slave, RecordingSlave)
         }
         self._followed: dict[str, FollowedInputs] = {}
+        self.in_python: dict[int, str] = {}
         self._kept: list[Any] = []
         self.writes: list[list[str]] = []
         self.reads: list[list[str]] = []
-        self.slaves = (CSlave * len(plan.steps))(*(self._slave(step) for step in plan.steps))
-        self.head = CProgram(start=axis.start, step=axis.step)
+        self.slaves = (CSlave * len(plan.steps))(*(self._member(i, step) for i, step in enumerate(plan.steps)))
+        if len(self.in_python) == len(plan.steps):
+            raise NotCompilable(next(iter(self.in_python.values()), "there are no components"))
+        self.head = CProgram(start=axis.start, step=axis.step, step_count=axis.count)
         self.head.values, self.head.value_count = plan.values.ctypes.data, len(plan.values)
         self.head.slaves, self.head.slave_count = ctypes.addressof(self.slaves), len(plan.steps)
         self.head.watch.slave = -1
@@ -206,6 +211,23 @@ class Program:
 
     # -- slaves -----------------------------------------------------------------------------------------------------
 
+    def _member(self, place: int, step: PlannedComponent) -> CSlave:
+        """A component as the stepper knows it, which may be that Python moves it."""
+        reason = reason_for_python(step, self.plan)
+        try:
+            made = self._slave(step) if reason is None else None
+        except NotCompilable as error:
+            made, reason = None, str(error)
+        if made is None:
+            made = CSlave(in_python=1)
+            made.no_way_back = ctypes.addressof(step.component.no_way_back)
+            made.left_at = ctypes.addressof(step.component.left_at)
+            self.in_python[place] = str(reason)
+            self.writes.append([])
+            self.reads.append([])
+        made.every, made.special = step.every, made.in_python or step.every != 1
+        return made
+
     def _slave(self, step: PlannedComponent) -> CSlave:
         component, inputs = step.component, step.inputs
         instance = self._instance(component)
@@ -217,11 +239,10 @@ class Program:
         made.returns_early = component.capabilities.mightReturnEarlyFromDoStep
         made.usual_step, made.rounding = component.usual_step, component.rounding
         made.heeds_events = bool(getattr(component, "has_event_mode", False))
-        writes, names = self._ports(component, "Set", inputs.names, inputs.buffer)
-        self.writes.append(names)
+        sent = [(int(place), inputs.names[place]) for place in inputs.passing]
+        writes, setters = self._ports(component, "Set", sent, inputs.buffer)
+        reads, getters = self._ports(component, "Get", list(enumerate(outputs)), step.outputs)
         made.writes, made.write_count = ctypes.addressof(writes), len(writes)
-        reads, names = self._ports(component, "Get", outputs, step.outputs)
-        self.reads.append(names)
         made.reads, made.read_count = ctypes.addressof(reads), len(reads)
         made.input_count, made.sources = len(inputs), self.keep(inputs.places.astype(np.int64))
         if np.any(inputs.factors != 1.0) or np.any(inputs.offsets != 0.0):
@@ -230,6 +251,8 @@ class Program:
         if isinstance(step.interpolator, MeanInterpolator):
             self._followed[component.name] = FollowedInputs(step.interpolator, inputs, self._native_of)
             made.followed = self._followed[component.name].address
+        self.writes.append(setters)
+        self.reads.append(getters)
         return made
 
     def _native_of(self, recording: Recording) -> int:
@@ -240,14 +263,13 @@ class Program:
         """Address of the instance in C."""
         if component.name in self._recordings:
             return self._recordings[component.name].address
-        _check(component)
         return _address_of(component.slave.component)
 
     def _ports(
-        self, component: Component, verb: str, names: Sequence[str], values: np.ndarray
+        self, component: Component, verb: str, names: Sequence[tuple[int, str]], values: np.ndarray
     ) -> tuple[ctypes.Array[CPort], list[str]]:
         groups: dict[str, list[tuple[int, Element]]] = {}
-        for place, name in enumerate(names):
+        for place, name in names:
             element = component.variables.element(name)
             if element.variable.name in component.negated:
                 raise NotCompilable(f"{component.name}.{name} is an alias with the other sign")
@@ -316,16 +338,6 @@ def _first_values(elements: Sequence[Element]) -> tuple[dict[str, int], int]:
             first[element.variable.name] = total
             total += size(element.variable)
     return first, total
-
-
-def _check(component: Component) -> None:
-    slave = component.slave
-    if component.kind != "FMU" or not is_native(slave) or not hasattr(slave, "_functions"):
-        raise NotCompilable(f"{component.name} runs in Python ({component.kind})")
-    if slave.fmiCallLogger is not None:
-        raise NotCompilable(f"the calls of {component.name} are logged")
-    if getattr(getattr(component, "_intermediate", None), "requested", False):
-        raise NotCompilable(f"{component.name} is given inputs during its steps")
 
 
 def _address_of(pointer: Any) -> int:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
+from cosim.components.recording import RecordingSlave
 from fmus.fmi.types import BOOLEANS, CTYPES
 
 OK = 0
@@ -87,3 +88,36 @@ def repeated(slave: Any, responses: Mapping[str, Sequence[RecordedReturn]]) -> I
         yield
     finally:
         functions.update(real)
+
+
+class Repetition:
+    """The time in which Python is at work on a step that the stepper has begun: slaves repeat what they said.
+
+    Nobody calls the stepper then.
+
+    Args:
+        slaves: of the plan, in its order.
+
+    `active` says that it is so now.
+    """
+
+    def __init__(self, slaves: Sequence[Any]) -> None:
+        self._slaves, self.active = slaves, False
+
+    @contextmanager
+    def of(self, responses: Mapping[int, Mapping[str, Sequence[RecordedReturn]]]) -> Iterator[None]:
+        """Within this context it is so.
+
+        Args:
+            responses: what was said, by place in the plan, then by function.
+        """
+        self.active = True
+        try:
+            with ExitStack() as stack:
+                for place, said in responses.items():
+                    slave = self._slaves[place]
+                    if not isinstance(slave, RecordingSlave):  # which goes to any time, whatever it was asked before
+                        stack.enter_context(repeated(slave, said))
+                yield
+        finally:
+            self.active = False

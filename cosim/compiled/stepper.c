@@ -2,16 +2,22 @@
    `GaussSeidel`, `Jacobi` (where every signal is held) and `PlannedComponent` of the Python stepper: the same calls with the same numbers in the same order.
 
    Nothing is allocated and nothing is kept here. Whatever is out of the ordinary is left to Python, which finishes the step. */
-#include "balises.c"
+#include "turns.c"
 
 #define SAMPLING 17 /* every so many steps the clock is read; prime, so as not to follow a rhythm of the model */
 
-static bool step_plan(Program *program, double t, double until, bool timed) {
+static bool step_plan(Program *program, int64_t k, double t, double until, bool timed) {
     const PlantMonitor *watch = &program->watch;
     bool watched = watch->slave >= 0 && !program->balises.by_instant;
     begin_step(program);
     for (int64_t i = 0; i < program->slave_count; i++) {
-        gather(&program->slaves[i], program->values, t, until);
+        Slave *slave = &program->slaves[i];
+        if (slave->special) {
+            if (!move_special(program, i, k, t, until, timed))
+                return false;
+            continue;
+        }
+        gather(slave, program->values, t, until);
         if (!move(program, i, t, until, timed))
             return false;
         if (watched && i == watch->slave && crossed(program)) {
@@ -59,8 +65,12 @@ EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, doub
                 break;
             used += events;
         } else {
-            if (!step_plan(program, t, until, timed))
+            if (program->saves ? !step_saved(program, k, t, until, timed) : !step_plan(program, k, t, until, timed))
                 break;
+        }
+        if (program->listener_count != 0 && anybody_hears(program)) {
+            stopped(program, STOP_EVENTS, program->slave_count, 0);
+            break;
         }
         double *row = rows + used++ * width;
         row[0] = until;
@@ -72,4 +82,20 @@ EXPORTED int64_t stepper_run(Program *program, int64_t first, int64_t last, doub
     program->rows_done = used;
     program->seconds = now() - begin;
     return k - first;
+}
+
+/* Bring all slaves from `t` to `until` [s], a part of a step; all have the same rate. Returns the number of rows of events, which has room for
+   ROWS_AT_MOST, or -1: Python goes on from where the program stopped. */
+EXPORTED int64_t stepper_part(Program *program, double t, double until, double *rows) {
+    *program->last_time = t;
+    program->balises.passed_count = 0;
+    double begin = now();
+    int64_t events = 0;
+    stopped(program, STOP_DONE, 0, 0);
+    if (is_over(program, t, until))
+        events = step_over(program, t, until, rows, ROWS_AT_MOST);
+    else if (!step_plan(program, PART, t, until, program->parts++ % SAMPLING == 0))
+        events = -1;
+    program->seconds = now() - begin;
+    return events;
 }

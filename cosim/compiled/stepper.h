@@ -115,7 +115,20 @@ typedef struct {
     double first_contradictions[CONTRADICTIONS]; /* when first [s] */
     int64_t warnings[CALLS];           /* of each function: how often it returned a warning */
     double first_warnings[CALLS];      /* when first [s] */
+    int64_t special;                   /* 0: the stepper moves it in each step */
+    int64_t every;                     /* it takes one step for so many of the plan; the last one whatever is left */
+    int64_t in_python;                 /* Python moves it, see `turn` */
+    void *save_state, *release_state;  /* functions; NULL: its state is not saved before a step that may be taken back */
+    void *saved;                       /* its state at the start of the step under way */
 } Slave;
+
+/* Inputs of a component that are events for it where they change, with what it was told last. */
+typedef struct {
+    int64_t count;
+    const int64_t *sources; /* where they lie in the values of the plan */
+    const double *factors, *offsets; /* NULL: nothing is converted */
+    const double *told;
+} Listener;
 
 /* A plant that is watched: steps in which it may pass a balise are not for the stepper. */
 typedef struct {
@@ -217,7 +230,9 @@ enum {
     STOP_NOT_FINITE, /* a value is not finite; the step is done and recorded */
     STOP_SENT,       /* in Python only */
     STOP_ARRIVE,     /* a function that sets the inputs of the end of the step failed; the slave is stepped */
-    STOP_HANDED,     /* a step over a balise is not ordinary: the values are those before it, the calls are in the journal */
+    STOP_HANDED,     /* a step is not ordinary, all of whose calls are noted: the values are those before it, the calls are in the journal */
+    STOP_TURN,       /* Python has moved the slave: it failed, or asks for the end of the run */
+    STOP_EVENTS,     /* all slaves are stepped; what changed is an event for one of them, and nothing is recorded */
 };
 
 typedef struct {
@@ -235,6 +250,12 @@ typedef struct {
     int64_t *rows_reported;     /* where the rows that are filled are counted, for the same */
     int64_t rows_before;        /* those that are filled before the chunk */
     const uint8_t *can_be_missing; /* values that may be NaN; NULL: none */
+    int64_t step_count;         /* of the run */
+    int64_t (*turn)(int64_t slave, double t, double until); /* Python moves a slave; 0: the step is Python's from here on */
+    int64_t saves;              /* all who can are saved before each step, in which one may meet an event that takes all back */
+    const Listener *listeners;
+    int64_t listener_count;
+    int64_t parts;              /* of steps, done so far */
     int64_t rows_done;          /* in the chunk: one for each step, and those of events */
     double seconds;             /* it lasted */
     /* where and why it ended */

@@ -47,6 +47,17 @@ class CSlave(ctypes.Structure):
         ("first_contradictions", ctypes.c_double * len(CONTRADICTIONS)),
         ("warnings", ctypes.c_int64 * len(StepperCall)),
         ("first_warnings", ctypes.c_double * len(StepperCall)),
+        *((name, ctypes.c_int64) for name in ("special", "every", "in_python")),
+        *((name, ctypes.c_void_p) for name in ("save_state", "release_state", "saved")),
+    )
+
+
+class CListener(ctypes.Structure):
+    """`Listener`."""
+
+    _fields_ = (
+        ("count", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("sources", "factors", "offsets", "told")),
     )
 
 
@@ -106,6 +117,12 @@ class CProgram(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("last_call", "last_time", "rows_reported")),
         ("rows_before", ctypes.c_int64),
         ("can_be_missing", ctypes.c_void_p),
+        ("step_count", ctypes.c_int64),
+        ("turn", ctypes.c_void_p),
+        ("saves", ctypes.c_int64),
+        ("listeners", ctypes.c_void_p),
+        ("listener_count", ctypes.c_int64),
+        ("parts", ctypes.c_int64),
         ("rows_done", ctypes.c_int64),
         ("seconds", ctypes.c_double),
         *((name, ctypes.c_int64) for name in ("stop", "slave", "port", "status", "event", "terminate", "early")),

@@ -34,7 +34,8 @@ class Inputs:
         non_numeric: inputs that are no numbers, or integers beyond doubles, gathered and sent with the others; or None.
 
     `gather` takes what holds for a step: of held signals the value at its start. `gather_now` takes what the sources
-    say now. `places` says where `gather` finds each value, shape (m,).
+    say now. `places` says where `gather` finds each value, shape (m,). `passing` are the places of those that are sent
+    in Step Mode.
     """
 
     def __init__(
@@ -55,7 +56,7 @@ class Inputs:
         self.tables = dict(tables or {})
         self.places, self._signals, self._count = sources.copy(), tuple(signals), len(values) // 2
         self._values, self.non_numeric = values, non_numeric
-        self.gated = False
+        self.gated, self.passing = False, np.arange(len(self.names))
         self.gather, self.gather_now = self._gathering(self.places), self._gathering(sources)
         if non_numeric is not None:
             self.gather, self.send = _both(self.gather, non_numeric.gather), _both(self.send, non_numeric.send)
@@ -73,13 +74,13 @@ class Inputs:
         """Mask of the inputs whose signal is held over a step, shape (m,)."""
         return np.asarray(self.places >= self._count)
 
-    def gate(self, send: Callable[[], None]) -> None:
+    def gate(self, send: Callable[[], None], passing: np.ndarray) -> None:
         """From now on a gate sends, and decides which inputs.
 
         Args:
-            send: writes what the gate lets pass of `buffer`.
+            send: writes what the gate lets pass of `buffer`. passing: places of what it lets pass in Step Mode.
         """
-        self.gated, self.send = True, send
+        self.gated, self.send, self.passing = True, send, passing
 
     def hold(self, signals: Set[Signal]) -> None:
         """These signals are held over a step."""

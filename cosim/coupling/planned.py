@@ -63,6 +63,7 @@ class PlannedComponent:
         continuous: mask of the outputs that may be interpolated between communication points, shape (q,).
         interpolator: gives the component the course of its inputs over a step; None where they are held.
         substeps: number of steps that the component takes for one of the master's.
+        every: number of the master's steps that make one of the component's.
 
     The calls that move it are the plain ones with the `stages` around them, outermost first:
 
@@ -84,6 +85,7 @@ class PlannedComponent:
     continuous: np.ndarray
     interpolator: PlannedInterpolator | None = field(default=None, init=False)
     substeps: int = field(default=1, init=False)
+    every: int = field(default=1, init=False)
     stages: tuple[Stage, ...] = field(default=(), init=False)
     prepare: Preparer = field(init=False, repr=False)
     move: Mover = field(init=False, repr=False)

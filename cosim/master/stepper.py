@@ -32,12 +32,18 @@ class Chunk:
 
 
 class _Stepper(Protocol):
-    """Does many communication steps in one call; `steps` counts them."""
+    """Does many communication steps in one call; `steps` counts them, `in_python` says of each component that Python
+    moves in them why.
+    """
 
     steps: int
+    in_python: dict[str, str]
 
     def run(self, k: int, recorder: Recorder) -> Chunk:
         """Do steps from number `k` on; their rows go to `recorder`."""
+
+    def summary(self, stepping: float) -> dict[str, Any]:
+        """Its share, plain data; `stepping` is what all steps took [s]."""
 
     def close(self) -> None:
         """Let go of the components."""
@@ -59,14 +65,28 @@ class StepperChoice:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user should know of a choice that was left to the program."""
-        fallback = self.wanted == "auto" and self.reason is not None
-        return (f"Python does all steps, not the compiled stepper: {self.reason}.",) if fallback else ()
+        if self.wanted != "auto":
+            return ()
+        if self.reason is not None:
+            return (f"Python does all steps, not the compiled stepper: {self.reason}.",)
+        reasons = () if self.compiled is None else self.compiled.in_python.values()
+        return (f"Between the steps of the compiled stepper: {'; '.join(reasons)}.",) if reasons else ()
 
-    def summary(self) -> dict[str, Any]:
-        """What to report of it after the run, plain data: the name, steps it did, and why not."""
+    def summary(self, stepping: float) -> dict[str, Any]:
+        """What to report of it after the run, plain data: the name, steps it did, why not, and its share.
+
+        Args:
+            stepping: what all steps took [s].
+        """
         if self.compiled is None:
             return {"name": "python", "steps_compiled": 0, "reason": self.reason}
-        return {"name": "compiled", "steps_compiled": self.compiled.steps, "reason": None}
+        return {
+            "name": "compiled",
+            "steps_compiled": self.compiled.steps,
+            "reason": None,
+            "in_python": dict(self.compiled.in_python),
+            **self.compiled.summary(stepping),
+        }
 
 
 ChooseStepper = Callable[[StepControl, TimeAxis], StepperChoice]

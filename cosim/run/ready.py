@@ -108,7 +108,7 @@ def _master_notes(master: Master) -> list[str]:
     if network is not None and master.stepper.compiled is not None:
         notes.append(
             "Packets are sent and delivered by Python: the compiled stepper halts at points with one, "
-            "and leaves steps with one inside to it."
+            "and takes steps with one inside in parts."
         )
     return notes
 

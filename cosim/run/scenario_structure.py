@@ -159,14 +159,14 @@ class _Steps:
     Args:
         part: which take part in events, and whether each gives some. divided: whether others halt within steps.
         returns: whether a component may end a step early, so that others must go back.
-        lines: components with inputs that follow lines. compiled: whether the compiled stepper may take them.
+        lines: components with inputs that follow lines. compiled: those that the compiled stepper may take.
     """
 
     part: Mapping[str, bool]
     divided: bool
     returns: bool
     lines: Set[str]
-    compiled: bool
+    compiled: Set[str]
 
 
 def _movement_chains(
@@ -182,7 +182,7 @@ def _movement_chains(
         stages = [rate_stage_text(own.every)] if own.every > 1 else []
         stages += _event_stage(coupled.components[name], steps)
         stages += _balise_stage(name, balises) or ([PACKET_STAGE_TEXT] if name in listeners else [])
-        stages += [_COMPILED] if steps.compiled else []
+        stages += [_COMPILED] if name in steps.compiled else []
         interpolator = _AT_SET_UP if name in steps.lines else None
         chains[name] = (
             *stages,
@@ -205,7 +205,7 @@ def _steps(
     ahead = followed(components, coupled.routed)
     every_line = table.master.inputs != "hold"
     lines = set(order) if every_line else {c.target[0] for c in coupled.routed if c.source_variable in ahead}
-    compiled = not part and not lines and _may_compile(table, components, coupled.routed, choice)
+    compiled = _may_be_compiled(table, components, coupled.routed, choice) - lines
     return _Steps(part, propagated or coupled.network is not None, returns, lines, compiled)
 
 
@@ -230,18 +230,22 @@ def _alone(table: ScenarioTable, balises: Balises | None) -> str | None:
     return balises.plant if early else None
 
 
-def _may_compile(
+def _may_be_compiled(
     table: ScenarioTable,
     components: Mapping[str, Component],
     connections: Sequence[Connection],
     choice: AlgorithmChoice,
-) -> bool:
-    """Whether nothing that is known before the run keeps it from the compiled stepper."""
+) -> set[str]:
+    """The components that nothing which is known before the run keeps from the compiled stepper."""
     master = table.master
-    rates = any(t.every > 1 or t.substeps > 1 for t in table.components.values())
-    python = any(c.kind != "FMU" for c in components.values()) or any(c.exact or c.table for c in connections)
-    steps = master.control == "fixed" and choice.algorithm in ("gauss-seidel", "jacobi") and master.threads == 1
-    return master.stepper != "python" and steps and not rates and not python
+    if master.stepper == "python" or master.control != "fixed" or master.threads != 1:
+        return set()
+    if choice.algorithm not in ("gauss-seidel", "jacobi"):
+        return set()
+    no_numbers = {end for c in connections if c.exact for end in (c.source[0], c.target[0])}
+    mapped = {c.target[0] for c in connections if c.table}
+    native = {n for n, c in components.items() if c.kind == "FMU" and table.components[n].substeps == 1}
+    return native - no_numbers - mapped
 
 
 def scenario_structure(task: RunTask) -> Structure:

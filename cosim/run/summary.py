@@ -73,7 +73,7 @@ def run_summary(task: RunTask, master: Master, setup_seconds: float) -> dict[str
         "master": {
             "algorithm": dict(master.system.algorithm.summary()),
             "control": dict(master.control.summary()),
-            "stepper": master.stepper.summary(),
+            "stepper": master.stepper.summary(timing.stepping + timing.recording),
             "events": None if master.system.events is None else master.system.events.summary(),
         },
     }

@@ -33,7 +33,7 @@ class _SlowRate:
         self._component, self._every, self._axis = planned.component, every, axis
         prepare = partial(partial, self._prepare)
         planned.add_stage(Stage(Position.RATE, rate_stage_text(every), prepare=prepare, move=around(self._move)))
-        planned.continuous[:] = False
+        planned.continuous[:], planned.every = False, every
 
     def _prepare(self, inner: Preparer, t: float, until: float, *, ends_known: bool | np.ndarray = False) -> None:
         """Gather the inputs at the end of its own step only: until then the last ones hold."""

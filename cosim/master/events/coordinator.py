@@ -111,14 +111,14 @@ class EventCoordinator:
     """Takes a system over a communication step with events on the way.
 
     Args:
-        system: what is stepped. participants: components that take part in events, in plan order.
+        system: what is stepped. participants: components that take part in events, in plan order; kept.
 
     `notes` says who cannot take part as it should; `redone` counts parts of steps taken again because of an early
     return.
     """
 
     def __init__(self, system: System, participants: Sequence[Participant]) -> None:
-        self._system, self._participants = system, list(participants)
+        self._system, self.participants = system, list(participants)
         self.iteration = _EventIteration(system.plan, participants)
         self.redone = 0
         self._span = Span()
@@ -136,7 +136,7 @@ class EventCoordinator:
         """Whether it divides steps at the instants of the network and at events of recordings alone: their times are
         known, and nothing that others do is an event for them.
         """
-        return all(isinstance(participant.component, RecordingComponent) for participant in self._participants)
+        return all(isinstance(participant.component, RecordingComponent) for participant in self.participants)
 
     # -- steps ------------------------------------------------------------------------------------------------------
 
@@ -146,7 +146,7 @@ class EventCoordinator:
         Raises:
             RunError: as for `advance`.
         """
-        for participant in self._participants:
+        for participant in self.participants:
             participant.gate.open()
         if self._network_is_due(t):
             self._system.network.handle(t)  # type: ignore[union-attr] # else nothing of it is due
@@ -178,9 +178,31 @@ class EventCoordinator:
                 raise self._stuck(reached)
             now = reached
 
+    @property
+    def takes_back(self) -> bool:
+        """Whether others are taken back where a component returns early, so that all are saved before each step."""
+        return bool(self._interrupters)
+
+    def go_on(self, until: float) -> None:
+        """Somebody else has begun a step to `until` [s]."""
+        self._span.end = until
+
+    def end(self, until: float, rows: Sequence[Row]) -> Sequence[Row]:
+        """Somebody else has brought the system to `until` [s], the end of a step; returns all rows of events in it.
+
+        Args:
+            rows: of events on the way.
+
+        Raises:
+            RunError: a component failed, or events do not settle.
+        """
+        if any(step.component.terminated for step in self._system.plan.steps):
+            return rows
+        return [*rows, *self._handle(until, until, bool(rows) and until - rows[-1][0] <= TIME_TOLERANCE)]
+
     def summary(self) -> dict[str, Any]:
         """What to report of it after the run, plain data."""
-        names = [p.name for p in self._participants]
+        names = [p.name for p in self.participants]
         iteration = self.iteration
         return {"participants": names, "instants": iteration.count, "longest": iteration.longest, "redone": self.redone}
 
@@ -188,7 +210,7 @@ class EventCoordinator:
 
     def save(self) -> Any:
         """What events change here; the states of the components are saved elsewhere."""
-        return [participant.save() for participant in self._participants], self.iteration.count, self.iteration.longest
+        return [participant.save() for participant in self.participants], self.iteration.count, self.iteration.longest
 
     def restore(self, state: Any) -> None:
         """Return to what was saved.
@@ -197,7 +219,7 @@ class EventCoordinator:
             state: as `save` gave it.
         """
         participants, self.iteration.count, self.iteration.longest = state
-        for participant, saved in zip(self._participants, participants, strict=True):
+        for participant, saved in zip(self.participants, participants, strict=True):
             participant.restore(saved)
 
     # -- parts of a step --------------------------------------------------------------------------------------------
@@ -207,7 +229,7 @@ class EventCoordinator:
         stop, network = until, self._system.network
         if network is not None and now + TIME_TOLERANCE < network.next_instant < stop:
             stop = network.next_instant
-        for participant in self._participants:
+        for participant in self.participants:
             component = participant.component
             if component.time < now - TIME_TOLERANCE or not component.can_vary_step:
                 continue  # it has not come here, or does not stop for it
@@ -225,7 +247,7 @@ class EventCoordinator:
         finally:
             if saved is not None:
                 self._system.release(saved)
-        for participant in self._participants:
+        for participant in self.participants:
             participant.component.event_pending |= participant.component is met
         return reached, rows
 
@@ -294,7 +316,7 @@ class EventCoordinator:
         return network is not None and network.is_due(t)
 
     def _stuck(self, t: float) -> RunError:
-        names = [p.name for p in self._participants if abs(p.component.time - t) <= TIME_TOLERANCE]
+        names = [p.name for p in self.participants if abs(p.component.time - t) <= TIME_TOLERANCE]
         return RunError(
             f"Time stands still at t = {t:g} s: {_MAX_EVENTS_WITHOUT_PROGRESS} events one after the other without any "
             f"progress; "

@@ -37,7 +37,9 @@ class Gate:
         self._unclocked = np.array(unclocked, dtype=np.intp)
         self._texts = inputs.non_numeric
         self._text_clocks = self._clocks_of_texts(component)
-        self._send_flowing = self._part(component, [i for i in unclocked if flows[i]])
+        flowing = [i for i in unclocked if flows[i]]
+        self._passing = np.array(flowing if events_pass else unclocked, dtype=np.intp)
+        self._send_flowing = self._part(component, flowing)
         self._send_unclocked = self._part(component, unclocked)
         self._groups = [
             (clocks, np.array(places, dtype=np.intp), self._part(component, places))
@@ -45,7 +47,20 @@ class Gate:
         ]
         self._sent: tuple[object, ...] = ()
         self._sent_clocked: dict[int, bytes] = {}
-        inputs.gate(self._send_at_first)
+        inputs.gate(self._send_at_first, self._passing)
+
+    @property
+    def listened(self) -> np.ndarray:
+        """Places of the numbers among the connected inputs of which a change is an event, shape (k,)."""
+        return self._discrete
+
+    @property
+    def told(self) -> bytes | None:
+        """What the component was told of these last, as doubles; None where it is not known, or texts are listened to
+        as well.
+        """
+        known = self._sent[0] if len(self._sent) == 1 else None
+        return known if isinstance(known, bytes) else None
 
     @property
     def listens(self) -> bool:
@@ -54,7 +69,7 @@ class Gate:
 
     def open(self) -> None:
         """The component runs: from now on Step Mode takes continuous inputs only."""
-        self._inputs.gate(self._send_flowing)
+        self._inputs.gate(self._send_flowing, self._passing)
 
     def changed(self) -> bool:
         """Whether gathered discrete inputs differ from what the component knows."""

@@ -52,6 +52,11 @@ class Participant:
         """Whether something of its own is due at `t` [s]."""
         return self.component.event_pending or self.component.next_event <= t + TIME_TOLERANCE
 
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nothing is to be seen to that was met or triggered before."""
+        return not self._waiting and not self.component.event_pending
+
     def hears(self) -> bool:
         """Whether somebody else changed something that is an event for it."""
         if self._waiting:

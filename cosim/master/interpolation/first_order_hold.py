@@ -90,6 +90,11 @@ class FirstOrderHold:
         self.slope = np.zeros(count)
         self._stood = np.full(count, np.nan)
 
+    @property
+    def sources(self) -> Sequence[Component]:
+        """The components that give the inputs, each once."""
+        return self._distinct
+
     def begin(self) -> None:
         """A step begins: what is held over it was true where its source stands now."""
         self._stood = self._times()

@@ -73,17 +73,6 @@ def test_early_returns_and_time_events_are_finished_in_python(tmp_path: Path) ->
     assert_equal(python, compiled)
 
 
-def test_events_propagated_stay_with_python(tmp_path: Path) -> None:
-    scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1).add("j", fmu=str(timed_fmu(tmp_path)))
-    scenario.add("z", fmu=str(linear_fmu(tmp_path, "z", [[0.0]], [[1.0]], [[1.0]], [[0.0]], version=2))).connect(
-        "j.level -> z.u1"
-    )
-    outcome = scenario.run(warn=lambda _: None)
-    stepper = outcome.result.summary["master"]["stepper"]
-    assert stepper["name"] == "python"
-    assert "events" in stepper["reason"]
-
-
 @pytest.mark.parametrize("version", [2, 3])
 def test_values_that_are_not_finite(tmp_path: Path, version: Any) -> None:
     """It grows by e^100 in each step until it overflows; the row with the infinity is kept."""
@@ -135,7 +124,7 @@ def test_without_a_compiler_python_does_it_and_says_so(tmp_path: Path, monkeypat
         scenario.run(overrides={"master.stepper": "compiled"}, warn=lambda _: None)
 
 
-def test_a_block_in_the_plan_stays_with_python(tmp_path: Path) -> None:
+def test_a_block_alone_stays_with_python(tmp_path: Path) -> None:
     alone = {"wheel_speed": 0.0}
     scenario = Scenario(folder=tmp_path, stop=1.0, step=0.1)
     scenario.add("odometer", model="odometer", parameters=alone, **{"as": "block3"})

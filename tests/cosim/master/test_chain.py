@@ -127,5 +127,5 @@ def test_show_lists_the_chains_of_the_run(case: str, tmp_path: Path, monkeypatch
         pattern = re.escape(reported).replace(r"chosen\ at\ set\-up", r"[a-z\-]+")
         assert re.fullmatch(pattern.replace(r"\ \(where\ the\ run\ can\ use\ it\)", ""), " > ".join(step.chain()))
         assert reported in structure.text()
-    lengths = {"balises": 2, "compiled": 2, "slow": 2, "events": 2, "local events": 1}
+    lengths = {"balises": 2, "compiled": 2, "slow": 3, "substeps": 2, "events": 3, "local events": 2}
     assert max(len(part.chain) for part in structure.parts) == lengths.get(case, max(1, 2 * ("told late" in case)))
