@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import argparse
 import ast
+import gc
 import io
 import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
@@ -226,7 +227,8 @@ class CommandProgram:
             return _DONE
         options = argparse.Namespace(command_line=shlex.join([self.name, *words]))
         try:  # reading the words loads the command, which may be interrupted too
-            self.parser(words).parse_args(words, options)
+            with _without_collection():
+                self.parser(words).parse_args(words, options)
             with self.within():
                 with warnings_in_lines(whole=options.verbose):
                     output = self._done(options)
@@ -300,6 +302,18 @@ class CommandProgram:
             parser.error(_unknown(used, commands, self))
         parser.epilog = "commands:\n\n" + _listed(commands, self.groups)
         return parser
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Within this context no garbage is looked for: of what modules make when they are loaded nearly all stays."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 def find_commands(package: str) -> list[Command]:
