@@ -10,7 +10,7 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from cosim.errors import CosimError, ScenarioError
+from cosim.errors import CosimError, OutputError, ScenarioError
 from cosim.run.described_components import describe_component
 from cosim.run.outcome import Outcome
 from cosim.runs.engine import Done, run_jobs
@@ -24,7 +24,7 @@ from cosim.scenario.override import CASE
 from cosim.studies.distributions import Distribution
 from cosim.studies.measures import Measure, error_measures, own_measures, setting_text
 from cosim.studies.sampling_plans import Mode, Variation, variations
-from cosim.studies.sweep_files import MOST_PAGES, run_folder, write_index, write_outcome
+from cosim.studies.sweep_files import MOST_PAGES, WrittenRun, run_folder, write_index, write_outcome
 from cosim.studies.sweep_result import SweepResult
 from cosim.studies.sweep_runs import SweepRun
 from fmus.cli.progress import Progress, Report, reported
@@ -86,7 +86,7 @@ class Sweep(FirstScreen):
             ScenarioError: `workers` is less than 1. RunError: the cluster cannot be used.
             KeyboardInterrupt: a run was interrupted; it has been handed over.
         """
-        jobs = self._jobs(whole, "")
+        jobs = self._jobs(lambda *_: whole, "")
         with make_executor(workers, scheduler, apart=_apart(jobs)) as executor:
             for done in run_jobs(jobs, executor, progress=progress):
                 warnings = () if done.row is None else tuple(done.row.warnings)
@@ -137,7 +137,8 @@ class Sweep(FirstScreen):
         if resume and directory is None:
             raise ScenarioError("A sweep is resumed from its folder: give directory=...")
         folder = None if directory is None else Path(directory)
-        rows = _Rows(measures, measure or {}, keep, folder, folders, len(self.variations) <= MOST_PAGES)
+        pages, away = len(self.variations) <= MOST_PAGES, scheduler is not None
+        rows = _Rows(measures, measure or {}, keep, folder, folders, pages, away)
         jobs = self._jobs(rows.take, code_content(measures, *rows.measure.values()))
         result = SweepResult(self.varied(0), self.names, [], dict(units or {}))  # which is whole in any case
         done: dict[int, SweepRun] = {}
@@ -152,8 +153,9 @@ class Sweep(FirstScreen):
                     write_index(result, folder)
         return result
 
-    def _jobs(self, take: Callable[[Outcome], Any], rests_on: str) -> list[Run]:
-        return [Run(self.scenario, settings, take, rests_on) for settings in self.variations]
+    def _jobs(self, take: Callable[[int, Variation], Callable[[Outcome], Any]], rests_on: str) -> list[Run]:
+        each = enumerate(self.variations)
+        return [Run(self.scenario, settings, take(number, settings), rests_on) for number, settings in each]
 
 
 @dataclass
@@ -163,7 +165,7 @@ class _Rows:
     Args:
         measures: taken of an outcome where it is run. measure: the user's, taken here. keep: whether outcomes stay.
         directory: of the sweep, or None. folders: whether a results folder is written for each run, and pages: whether
-            with a page in it.
+            with a page in it. away: whether runs are done on machines that may not reach the directory.
     """
 
     measures: Measures
@@ -172,35 +174,42 @@ class _Rows:
     directory: Path | None
     folders: bool
     pages: bool
+    away: bool
     outcomes: dict[int, Outcome] = field(default_factory=dict)
 
     @property
-    def take(self) -> Callable[[Outcome], Any]:
-        """What is taken of an outcome where it is run: all of it where it is needed here."""
-        return whole if self.keep or self.measure or self._written else self.measures
+    def _written(self) -> Path | None:
+        """Where each run is written."""
+        return self.directory.absolute() if self.folders and self.directory is not None else None
 
-    @property
-    def _written(self) -> bool:
-        return self.folders and self.directory is not None
+    def take(self, number: int, settings: Variation) -> Callable[[Outcome], Any]:
+        """What is taken of an outcome where it is run: all of it where it is needed here."""
+        directory = self._written
+        take = whole if self.keep or self.measure or (directory and self.away) else self.measures
+        if directory is None or self.away:
+            return take
+        return WrittenRun(take, settings, directory / run_folder(number), self.pages)
 
     def row(self, number: int, job: Job, ended: Ended) -> dict[str, Any]:
-        """The row of a run; its results are written."""
-        warnings = list(ended.warnings)
+        """The row of a run, whose results are written by then."""
+        if isinstance(ended.row, OutputError):
+            raise ended.row
+        directory = self._written
+        folder = None if directory is None or ended.row is None else run_folder(number)
+        data = {"measures": ended.row or {}, "faults": [], "folder": folder, "warnings": list(ended.warnings)}
         if not isinstance(ended.row, Outcome):
-            return {"measures": ended.row or {}, "faults": [], "folder": None, "warnings": warnings}
+            return data
         outcome = ended.row
         own, faults = own_measures(outcome, self.measure)
-        folder = run_folder(number) if self._written else None
-        if self.directory is not None and folder is not None:
-            write_outcome(outcome, job.settings, self.directory / folder, report=self.pages)
+        if self.away and directory is not None:
+            write_outcome(outcome, job.settings, directory / run_folder(number), report=self.pages)
         if self.keep:
             self.outcomes[number] = outcome
-        measures = {**self.measures(outcome), **own}
-        return {"measures": measures, "faults": faults, "folder": folder, "warnings": warnings}
+        return data | {"measures": {**self.measures(outcome), **own}, "faults": faults}
 
     def fits(self, number: int, row: Mapping[str, Any]) -> bool:
         """Whether the results of an earlier sweep's run stand in the folder that they would have in this one."""
-        return not self._written or bool(row["folder"] == run_folder(number))
+        return self._written is None or bool(row["folder"] == run_folder(number))
 
     def run(self, done: Done) -> SweepRun:
         """A run that is done, with the outcome where it is kept."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +46,33 @@ def write_outcome(outcome: Outcome, settings: Mapping[str, Any], folder: Path, *
         OutputError: the folder cannot be written.
     """
     outcome.with_summary(sweep_settings=dict(settings)).write(folder, report=report)
+
+
+@dataclass(frozen=True)
+class WrittenRun:
+    """What is taken of an outcome where it was run; its results are written there, so that its rows need not travel and
+    workers write side by side.
+
+    Args:
+        take: of the outcome. settings, folder, report: as for `write_outcome`.
+    """
+
+    take: Callable[[Outcome], Any]
+    settings: Mapping[str, Any]
+    folder: Path
+    report: bool
+
+    def __call__(self, outcome: Outcome) -> Any:
+        """What is taken; the error, where the results cannot be written, which ends the study and not this run alone.
+
+        Args:
+            outcome: of the run.
+        """
+        try:
+            write_outcome(outcome, self.settings, self.folder, report=self.report)
+        except OutputError as error:
+            return error
+        return self.take(outcome)
 
 
 def write_sweep(result: SweepRuns, directory: Path) -> dict[str, Path]:

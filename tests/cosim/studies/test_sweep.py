@@ -99,6 +99,30 @@ def test_results_do_not_depend_on_the_number_of_workers() -> None:
     assert done == [(1, 3), (2, 3), (3, 3)]
 
 
+@pytest.mark.parametrize("keep", [False, True])
+def test_folders_do_not_depend_on_who_wrote_them(tmp_path: Path, *, keep: bool) -> None:
+    """One process or two, with outcomes kept or not: the same files with the same bytes, but for times of the clock."""
+    sweep = plant().vary({"train.mass": MASSES})
+    here = sweep.run(keep=keep, directory=tmp_path / "here")
+    there = sweep.run(2, keep=keep, directory=tmp_path / "there")
+    assert [run.measures for run in here.runs] == [run.measures for run in there.runs]
+    assert [run.folder for run in there.runs] == [tmp_path / "there" / f"run_00{k}" for k in range(2)]
+    files = [sorted(p.relative_to(root) for root in [tmp_path / f] for p in root.rglob("*")) for f in ("here", "there")]
+    assert files[0] == files[1]
+    for table in (tmp_path / "here").rglob("table.csv"):
+        assert table.read_bytes() == (tmp_path / "there" / table.relative_to(tmp_path / "here")).read_bytes()
+    for outcome in here.runs + there.runs:
+        assert (outcome.outcome is not None) == keep
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_results_that_cannot_be_written_end_the_sweep(tmp_path: Path, workers: int) -> None:
+    """A file stands where the folder of a run should be."""
+    (tmp_path / "run_000").write_text("")
+    with pytest.raises(OutputError, match="run_000"):
+        plant().vary({"train.mass": MASSES}).run(workers, keep=False, directory=tmp_path)
+
+
 def test_runs_that_fail_do_not_stop_the_others(tmp_path: Path) -> None:
     """The first and the last cannot begin; a measure of the user's fails in one of the others."""
 
