@@ -15,12 +15,12 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from plant_models.explained_error import explained
+from plant_models.module_loading import load_module
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
@@ -297,7 +297,7 @@ def lazy_names(room: str) -> Callable[[str], Any]:
             definition = re.compile(rf"^(?:(?:class |def ){name}\b|(?:\w+, )*{name}\b[^.\n(]*=)", re.MULTILINE)
             for path in files:
                 if definition.search(path.read_text(encoding="utf-8")):
-                    return getattr(import_module(f"{room}.{path.stem}"), name)
+                    return getattr(load_module(f"{room}.{path.stem}"), name)
         raise AttributeError(f"module {room!r} has no attribute {name!r}")
 
     return get
@@ -314,7 +314,7 @@ def lazy_imports(room: str, homes: Mapping[str, str]) -> tuple[Callable[[str], A
     def get(name: str) -> Any:
         if name not in homes:
             raise AttributeError(f"module {room!r} has no attribute {name!r}")
-        found = getattr(import_module(homes[name]), name)
+        found = getattr(load_module(homes[name]), name)
         setattr(sys.modules[room], name, found)
         return found
 
@@ -334,7 +334,7 @@ def load(target: str) -> Any:
         ImportError, AttributeError: there is no such module, or no such name in it.
     """
     module, _, name = target.partition(":")
-    found: Any = import_module(module)
+    found: Any = load_module(module)
     for part in name.split("."):
         found = getattr(found, part)
     return found

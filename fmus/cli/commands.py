@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import argparse
 import ast
-import gc
 import io
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
@@ -35,6 +34,7 @@ from fmus.tables.terminal import terminal_width
 from fmus.versions import version_text
 from plant_models.code_trust import looking
 from plant_models.missing_package import missing_package
+from plant_models.module_loading import load_module
 
 Execute = Callable[[argparse.Namespace], Output]
 """Runs a command with its options."""
@@ -227,8 +227,7 @@ class CommandProgram:
             return _DONE
         options = argparse.Namespace(command_line=shlex.join([self.name, *words]))
         try:  # reading the words loads the command, which may be interrupted too
-            with _without_collection():
-                self.parser(words).parse_args(words, options)
+            self.parser(words).parse_args(words, options)
             with self.within():
                 with warnings_in_lines(whole=options.verbose):
                     output = self._done(options)
@@ -295,25 +294,13 @@ class CommandProgram:
         used = next((word for word in words if not word.startswith("-")), None)
         module = f"{used}{_ENDING}".replace("-", "_")
         if used is not None and used.replace("-", "").isalnum() and (_folder(self.package) / module).is_file():
-            _add_command(subparsers, used, import_module(f"{self.package}.{module.removesuffix('.py')}"))
+            _add_command(subparsers, used, load_module(f"{self.package}.{module.removesuffix('.py')}"))
             return parser
         commands = find_commands(self.package)
         if used is not None:
             parser.error(_unknown(used, commands, self))
         parser.epilog = "commands:\n\n" + _listed(commands, self.groups)
         return parser
-
-
-@contextmanager
-def _without_collection() -> Iterator[None]:
-    """Within this context no garbage is looked for: of what modules make when they are loaded nearly all stays."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
 
 
 def find_commands(package: str) -> list[Command]:
