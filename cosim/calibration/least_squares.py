@@ -186,20 +186,20 @@ class _Residuals:
 
     @property
     def spreads(self) -> Array:
-        """Standard deviations of the measured signals, shape (q,)."""
-        rows = zip(self._measured, self.known, strict=True)
-        return np.array([np.std(row[k]) if k.any() else 1.0 for row, k in rows])
+        """Standard deviations of the measured signals, of what is constant its size, shape (q,)."""
+        rows = [row[k] for row, k in zip(self._measured, self.known, strict=True)]
+        return np.array([np.std(row) or np.abs(row).max() or 1.0 if len(row) else 1.0 for row in rows])
 
 
 def _fit(residuals: _Residuals, start: Array, noise: Array | None) -> Fit:
     known, sizes, spreads = residuals.known, residuals.sizes, residuals.spreads
-    weights = 1.0 / (np.where(spreads > 0.0, spreads, 1.0) if noise is None else noise)
+    weights = 1.0 / (spreads if noise is None else noise)
     found, converged = start / sizes, False
     for _ in range(1 if noise is not None or len(known) == 1 else _REPEATS):
         found, converged = _weighted(residuals, found, weights)
         left = residuals(found * sizes)
         if noise is None:
-            weights = 1.0 / np.maximum(_deviations(left, known), 1e-12 * np.maximum(spreads, 1e-300))
+            weights = 1.0 / np.maximum(_deviations(left, known), 1e-12 * spreads)
     left, slopes = residuals(parameters := found * sizes), -residuals.jacobian(parameters)
     rows = zip(left, slopes * sizes, known, strict=True)
     shown = [noise_of(row[there], slope[there]) for row, slope, there in rows]
@@ -241,6 +241,7 @@ def _covariance(slopes: Array, weights: Array, spreads: Array) -> Array:
     """Covariance of weighted least squares, shape (p, p), for slopes, shape (q, n, p), and the covariances of ``J'
     noise`` of each signal, shape (q, p, p); infinite directions are made very wide, not lost.
     """
+    weights = weights * 2.0 ** -np.floor(np.log2(weights.max()))  # which the result does not depend on
     normal = np.einsum("qni,qnj,q->ij", slopes, slopes, weights**2)
     values, vectors = np.linalg.eigh(normal)
     shown = values > np.finfo(float).eps * max(float(values[-1]), np.finfo(float).tiny)

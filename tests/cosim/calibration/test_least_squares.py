@@ -106,3 +106,18 @@ def test_samples_that_were_not_taken_do_not_dilute_the_correlation() -> None:
     assert found.correlation[0] == pytest.approx(0.8**3, abs=0.1)
     assert found.noise[0] == pytest.approx(0.1, rel=0.1)
     assert found.samples_per_independent[0] == pytest.approx((1.0 + 0.8**3) / (1.0 - 0.8**3), rel=0.3)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1.0, 1e-100])
+@pytest.mark.parametrize("truth", [[2.0, -3.0], [2.0, 0.0]])
+def test_a_perfect_fit_is_found_without_a_warning(truth: list[float], size: float) -> None:
+    """Two signals, of which one is constant where the slope is 0: nothing is left of either."""
+
+    def simulate(p: np.ndarray) -> np.ndarray:
+        return size * np.stack([p[:, :1] * np.exp(X[:20, 1]), p[:, 1:] * X[:20, 1] + 1.0], axis=1)
+
+    found = fit(simulate, np.array([1.0, 1.0]), simulate(np.array([truth]))[0])
+    np.testing.assert_allclose(found.parameters, truth, atol=1e-9)  # of steps of the fit
+    assert np.all(found.half_widths(0.95) < 1e-9)
+    assert found.covers(np.array(truth), 0.95) or np.ptp(found.residuals) > 0.0
