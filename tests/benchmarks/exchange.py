@@ -2,7 +2,8 @@
 
 Sections: ``steps`` (a communication step of 10 ms of the locomotive, FMI 2 and 3, inputs held and inputs that jump at
 every step, against fmpy's CVode under the same inputs and the same FMU's co-simulation), ``beside`` (a run with an
-observer, by each stepper).
+observer, by each stepper), ``own`` (instructions of a step whose input jumps, by the compiled stepper: of the FMU's own
+calls, of the solver, and of all else, by valgrind; some minutes).
 
 Run it with ``python tests/benchmarks/exchange.py [SECTION ...]``; without a section, all of them. Nothing is asserted.
 A further section is a function in `SECTIONS` that prints.
@@ -10,7 +11,10 @@ A further section is a function in `SECTIONS` that prints.
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tempfile
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from time import process_time
@@ -109,7 +113,49 @@ def beside() -> None:
                 print(f"{stepper}, {interface}: {process_time() - begin:.2f} s for 20 s")
 
 
-SECTIONS: dict[str, Callable[[], None]] = {"steps": steps, "beside": beside}
+def driven(path: Path, count: int) -> None:
+    """Steps of the compiled stepper in which the effort jumps, as a recording says."""
+    rows = "".join(f"{STEP * k!r},{50e3 + k}\n" for k in range(count + 1))
+    efforts = path.with_suffix(".csv")
+    efforts.write_text(f"time [s],effort [N]\n{rows}")
+    s = Scenario(stop=count * STEP, step=STEP).add("source", recording=str(efforts), interpolation="hold")
+    s = s.add("train", fmu=str(path), interface="model-exchange", tolerance=TOLERANCE, parameters=STARTS)
+    s = s.connect("source.effort -> train.effort").set("master.stepper", "compiled").set("master.events", "local")
+    print(s.run(progress=False).result.summary["components"][1]["solver"])
+
+
+def instructions(path: Path, count: int) -> Counter[str]:
+    """Of so many steps and all before them, by the name of the library."""
+    out = path.with_suffix(f".{count}")
+    valgrind = ["valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", "--compress-strings=no"]
+    code = f"import exchange, pathlib; exchange.driven(pathlib.Path({str(path)!r}), {count})"
+    subprocess.run([*valgrind, "--compress-pos=no", sys.executable, "-c", code], check=True, cwd=Path(__file__).parent)
+    found, library, inclusive = Counter[str](), "", False
+    for line in out.read_text(errors="replace").splitlines():
+        if line.startswith("ob="):
+            library = Path(line[3:]).name
+        elif line[:1].isdigit():  # a line of source and its instructions, behind a call those of what is called
+            found[library] += 0 if inclusive else int(line.split()[1])
+        inclusive = line.startswith("calls=")
+    return found
+
+
+def own() -> None:
+    """What a step costs the FMU, the solver and all else, from the difference of a long run and a short one."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = build_fmu(Locomotive(), Path(folder) / "locomotive.fmu", fmi_version=2)
+        few, many = instructions(path, 500), instructions(path, 2500)
+    spent = {name: (many[name] - few[name]) / 2000 for name in many}
+    fmu = spent.pop("locomotive.so") + spent.pop("libm.so.6")
+    solver = sum(spent.pop(name) for name in [*spent] if name.startswith("sundials_"))
+    ideal = fmu + solver
+    print(f"the FMU's own calls {fmu:.0f} instructions a step, the solver {solver:.0f}")
+    for name in ("exchange.so", "stepper.so"):
+        print(f"{name}: {spent[name]:.0f}, {spent[name] / ideal:.3f} of both")
+    print(f"all: {(ideal + sum(spent.values())) / ideal:.3f} of both")
+
+
+SECTIONS: dict[str, Callable[[], None]] = {"steps": steps, "beside": beside, "own": own}
 
 
 if __name__ == "__main__":
