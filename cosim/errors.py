@@ -76,6 +76,16 @@ class RunError(CosimError, RuntimeError):
         self.component, self.time = component, time
 
 
+def not_utf8(data: bytes) -> str:
+    """Which line is the first that is no UTF-8, in words.
+
+    Args:
+        data: that could not be decoded.
+    """
+    line = next((k for k, part in enumerate(data.split(b"\n"), 1) if part.decode(errors="ignore").encode() != part), 1)
+    return f"line {line} is not UTF-8"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint with the names nearest to a misspelt one, or all of them, 20 at most, where none is near.
 

@@ -22,7 +22,7 @@ from cosim.baselines.draft import BaselineDraft, make_draft, text_digest
 from cosim.baselines.header_data import header_data, header_from, is_newer
 from cosim.baselines.recipe import Recipe
 from cosim.comparison.tolerance import Tolerances
-from cosim.errors import BaselineError, OutputError, nearest
+from cosim.errors import BaselineError, OutputError, nearest, not_utf8
 from cosim.results.record_rows import TELEGRAM_ROWS
 from cosim.results.result import BaliseRecord, Result
 from cosim.results.table_layout import table_dtype
@@ -365,7 +365,9 @@ def _demanded(path: Path, why: str) -> str:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError as error:
         raise BaselineError(f"{path} is missing: {why}. {_AGAIN}") from error
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise BaselineError(f"{path}: {not_utf8(path.read_bytes())}. {_AGAIN}") from error
+    except OSError as error:
         raise BaselineError(f"{path} cannot be read: {error}. {_AGAIN}") from error
     marked = any(marker in text for marker in MARKERS)
     for number, line in enumerate(text.splitlines() if marked else (), 1):

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from cosim.diagnostics.messages import read_messages, write_messages
-from cosim.errors import OutputError
+from cosim.errors import OutputError, not_utf8
 from cosim.results.block_file import BLOCK_FILE, read_block
 from cosim.results.formats.columns import check_time
 from cosim.results.formats.growing_npy import read_grown
@@ -169,9 +169,7 @@ def _part(path: Path, read: Callable[[Path], Part]) -> Part:
     try:
         return read(path)
     except UnicodeDecodeError:
-        lines = path.read_bytes().split(b"\n")
-        line = next(k for k, part in enumerate(lines, start=1) if part.decode(errors="ignore").encode() != part)
-        raise ValueError(f"{path.name}: line {line} is not UTF-8") from None
+        raise ValueError(f"{path.name}: {not_utf8(path.read_bytes())}") from None
     except ValueError as error:
         said = first_wrong(error) if isinstance(error, ValidationError) else str(error).removesuffix(".")
         raise ValueError(said if path.name in said else f"{path.name}: {said}") from error

@@ -12,7 +12,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from cosim.errors import ProvenanceError
+from cosim.errors import ProvenanceError, not_utf8
 from cosim.results.summary_file import first_wrong
 from fmus.near_files import near_files
 
@@ -186,6 +186,8 @@ def _why(error: Exception) -> str:
         return f"{error} is missing; another program wrote it, or it was edited"
     if isinstance(error, TypeError):
         return "it is not a table; another program wrote it, or it was edited"
+    if isinstance(error, UnicodeDecodeError):
+        return not_utf8(error.object)
     return f"it is cut off or was edited ({error})"
 
 

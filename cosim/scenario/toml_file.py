@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from cosim.errors import not_utf8
 from cosim.scenario.toml_mistakes import mistake
 
 _ARCHIVE = b"PK\x03\x04"
@@ -30,8 +31,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise ValueError(f"line {line} is not UTF-8; save the file as UTF-8 text") from error
+        raise ValueError(f"{not_utf8(data)}; save the file as UTF-8 text") from error
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

@@ -104,6 +104,9 @@ class CsvFormat(Format):
                 raise ValueError(f"{path} is not a result table: its first column must be 'time', got {names[:1]}.")
             first = file.readline()
             headings = dict(map(split_unit, names))
+            if len(headings) < len(names):
+                twice = max(headings, key=[split_unit(name)[0] for name in names].count)
+                raise ValueError(f"{path} is not a result table: column {twice!r} stands twice.")
             if not first:
                 return bare(np.empty(0, table_dtype(list(headings))))
             try:

@@ -120,7 +120,12 @@ LINES = {
     """,
 }
 """Commands that read what is damaged."""
-OWNERS = {"ride.csv": r"replay\.toml: .*\bride\b", "baseline.csv": r"baseline\.json", "manifest.json": "results/"}
+OWNERS = {
+    "scenario.toml": "the run ended early: ",
+    "ride.csv": r"replay\.toml: .*\bride\b",
+    "baseline.csv": r"baseline\.json",
+    "manifest.json": "results/",
+}
 """By a damaged file what else may be named as the place: the file that names it, with the part that is read from it."""
 ARCHIVES = {"description": ("coast.fmu", "modelDescription.xml"), "package": ("system.ssp", ".ssd")}
 
