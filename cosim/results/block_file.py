@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import mmap
 import weakref
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -76,8 +77,11 @@ class BlockFile:
         return int(np.frombuffer(self._map, np.int64, CELLS).ctypes.data) + 8 * COUNT
 
     def remove(self) -> None:
-        """The rows are elsewhere now; whoever has the block still may fill it."""
-        self._path.unlink(missing_ok=True)
+        """The rows are elsewhere now; whoever has the block still may fill it. In a folder that is read-only by now it
+        stays, as an empty one.
+        """
+        with suppress(OSError):
+            self._path.unlink()
 
 
 @dataclass(frozen=True)
