@@ -13,9 +13,30 @@ from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 from tempfile import gettempdir
+from time import time
 
-_HOST = sha256(os.uname().nodename.encode()).hexdigest()[:6] if hasattr(os, "uname") else "000000"
-_OWNER = re.compile(rf"[-_]{_HOST}-(\d+)-")
+
+def _said(path: str) -> str:
+    """What Linux says of itself in a file or a link; empty elsewhere."""
+    place = Path(path)
+    with suppress(OSError):
+        return str(place.readlink()) if place.is_symlink() else place.read_text(encoding="utf-8", errors="replace")
+    return ""
+
+
+def _digest(text: str) -> str:
+    return sha256(text.encode()).hexdigest()[:6]
+
+
+_HOST = _digest(os.uname().nodename if hasattr(os, "uname") else "")
+_NUMBERED = _digest(_said("/proc/sys/kernel/random/boot_id") + _said("/proc/self/ns/pid"))
+"""Where numbers of processes mean the same: containers may share the name of the host and a folder, and each has a
+process 1."""
+_OWNER = re.compile(rf"[-_]{_HOST}-([0-9a-f]{{6}})-(\d+)-(\d+)-")
+_FORGOTTEN = 7 * 86400.0
+"""What lies untouched for so long is nobody's, though it cannot be asked who made it: before the last start of the
+machine, or in another container [s].
+"""
 _swept: set[str] = set()
 """Folders that this process has looked at."""
 
@@ -32,17 +53,18 @@ def owned(prefix: str, folder: Path | str | None = None) -> str:
         _swept.add(place)
         with suppress(OSError):
             _sweep(place)
-    return f"{prefix}{_HOST}-{os.getpid()}-"
+    return f"{prefix}{_HOST}-{_NUMBERED}-{os.getpid()}-{_begin(os.getpid())}-"
 
 
 def _sweep(place: str) -> None:
     with os.scandir(place) as entries:
         left = [(entry, owner) for entry in entries if (owner := _OWNER.search(entry.name))]
     for entry, owner in left:
-        if _is_alive(int(owner[1])):
-            continue
         with suppress(OSError):
-            if entry.stat(follow_symlinks=False).st_uid != os.getuid():
+            status = entry.stat(follow_symlinks=False)
+            known = owner[1] == _NUMBERED
+            is_left = not _is_alive(int(owner[2]), owner[3]) if known else status.st_mtime < time() - _FORGOTTEN
+            if status.st_uid != os.getuid() or not is_left:
                 continue
             if entry.is_dir(follow_symlinks=False):
                 shutil.rmtree(entry.path, ignore_errors=True)
@@ -50,14 +72,18 @@ def _sweep(place: str) -> None:
                 Path(entry.path).unlink()
 
 
-def _is_alive(process: int) -> bool:
-    """Whether a process runs; one that ended and that nobody asked how does not, though its number is taken."""
+def _begin(process: int) -> str:
+    """When a process began, as the system counts it, and no other one of its number; 0 where it does not say."""
+    stat = _said(f"/proc/{process}/stat").rpartition(")")[2].split()
+    return stat[19] if len(stat) > 19 and stat[0] != "Z" else "0"
+
+
+def _is_alive(process: int, begin: str) -> bool:
+    """Whether a process that began then runs; one that ended and that nobody asked how does not."""
     try:
         os.kill(process, 0)
-        if Path(f"/proc/{process}/stat").read_bytes().rpartition(b")")[2].split()[0] == b"Z":
-            return False
     except (ProcessLookupError, OverflowError):
         return False
-    except (OSError, IndexError):  # it is somebody else's, or the system says no more of it
-        return True
-    return True
+    except OSError:  # it is somebody else's
+        pass
+    return _begin(process) == begin

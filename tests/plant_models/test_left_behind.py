@@ -48,18 +48,27 @@ def test_what_the_dead_left_goes_and_what_is_in_use_or_of_others_stays(
     (tmp_path / ".writing-results").mkdir()
     (tmp_path / f".writing-ffffff-{2**22 - 1}-abc").mkdir()  # of another machine
     (tmp_path / "x").mkdir()
-    dead = owned("fmu_").replace(str(os.getpid()), str(2**30))
+    own = owned("fmu_")
+    host, numbered, process, begin = own.removeprefix("fmu_").removesuffix("-").split("-")
+    dead = own.replace(f"-{process}-", f"-{2**30}-")
     (tmp_path / f"{dead}link").symlink_to(tmp_path / "x")
+    earlier = [tmp_path / f"fmu_{host}-{numbered}-{process}-{int(begin) - 1}-x"] if begin != "0" else []
+    container = [tmp_path / f"fmu_{host}-ffffff-{2**30}-{begin}-{k}" for k in range(2)]  # its numbers say nothing here
+    for folder in (*earlier, *container):
+        folder.mkdir()
+    os.utime(container[0], (0.0, 0.0))
     before = {path.name for path in tmp_path.iterdir()}
     assert owned(".made_from-", tmp_path).startswith(".made_from-")
     gone = before - {path.name for path in tmp_path.iterdir()}
-    assert len(gone) == 3  # the folder and the file, and a link, not what it leads to
+    assert len(gone) == 4 + len(earlier)  # the folder and the file, a link, not what it leads to, what is old
+    assert container[1].is_dir()
+    assert not any(folder.exists() for folder in (*earlier, container[0]))
     assert (tmp_path / "x").is_dir()
-    assert len(list(tmp_path.glob(f".*-{living.pid}-*"))) == 2
+    assert len(list(tmp_path.glob(f".*-{living.pid}-[0-9]*-*"))) == 2
     living.communicate("")
     owned(".pack-", tmp_path)
-    assert len(list(tmp_path.glob(f".*-{living.pid}-*"))) == 2  # once in a process
+    assert len(list(tmp_path.glob(f".*-{living.pid}-[0-9]*-*"))) == 2  # once in a process
     monkeypatch.setattr(left_behind, "_swept", set())
     owned(".pack-", tmp_path)
-    assert not list(tmp_path.glob(f".*-{living.pid}-*"))
+    assert not list(tmp_path.glob(f".*-{living.pid}-[0-9]*-*"))
     killed.wait()
