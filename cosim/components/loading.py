@@ -262,7 +262,7 @@ def load_fmu(
 def _put_away(folder: Path, path: Path, slave: Any) -> None:
     """Remove what was unpacked; an FMU that ended its own process is remembered."""
     shutil.rmtree(folder, ignore_errors=True)
-    if getattr(slave, "apart", False) and slave.dll.reason:
+    if getattr(slave, "apart", False) and slave.dll.reason and not slave.dll.interrupted:
         with suppress(OSError):
             note_crash(file_digest(path), slave.dll.reason)
 

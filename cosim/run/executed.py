@@ -262,6 +262,9 @@ def _step(ready: Ready, interruption: Interruption, remarks: Remarks) -> _Execut
         ready.master.run()
     except CosimError as error:
         failure = explained_failure(error, ready.master.plan, _as_recorded(ready))
+        if interruption.came:  # a call that did not return was given up
+            remarks.warn(failure)
+            failure = INTERRUPTED
     except KeyboardInterrupt:
         failure = INTERRUPTED
     return _Executed(failure, frozenset(surroundings.finish()))

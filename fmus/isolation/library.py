@@ -47,12 +47,13 @@ class IsolatedLibrary:
     """
 
     def __init__(self, proxy: ctypes.CDLL, options: _Options, names: Mapping[int, str]) -> None:
-        self._proxy, self._names, self._said, self._closed = proxy, names, "", False
+        self._proxy, self._names, self._said = proxy, names, ""
+        self._closed = self._interrupted = False
         self._handle = proxy._handle
         self._prefix = f"{Path(proxy._name).stem}_"  # of the functions of FMI 1
         proxy.isolation_reason.restype = proxy.isolation_printed.restype = ctypes.c_char_p
-        proxy.isolation_has.restype = ctypes.c_bool
-        proxy.isolation_open.restype = ctypes.c_bool
+        for name in ("has", "open", "interrupted"):
+            getattr(proxy, f"isolation_{name}").restype = ctypes.c_bool
         if not proxy.isolation_open(ctypes.byref(options)):
             raise RuntimeError(self.reason)
 
@@ -77,10 +78,16 @@ class IsolatedLibrary:
         self._said = "; ".join([said, *more])
         return self._said
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether the last process ended because a user asked for the end."""
+        return self._interrupted if self._closed else bool(self._proxy.isolation_interrupted())
+
     def close(self) -> None:
         """End all processes behind it; what went wrong in that is in `reason`."""
         if not self._closed:
             self._proxy.isolation_close()
+            self._interrupted = self.interrupted
             self._said, self._closed = self.reason, True
 
     def _text(self, name: str) -> str:

@@ -14,7 +14,7 @@ from fmus.toolchain.compile import CompilationError, CompilerMissing, find_compi
 from plant_models.disk_cache.folder import cache_folder
 
 _SHARED = ("shared.h", "functions.h")
-_PROXY = ("proxy.c", "session.h", "requests.h", "reading_ahead.h", "pacing.h", *_SHARED)
+_PROXY = ("proxy.c", "session.h", "requests.h", "reading_ahead.h", "interruption.h", "pacing.h", *_SHARED)
 _CHILD = ("child.c", "supervisor.h", "callbacks.h", *_SHARED)  # of each the first one includes the others
 
 

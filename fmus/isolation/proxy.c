@@ -125,10 +125,15 @@ static void put_away(Session *s) {
         s->outside = "unloading its library";
         send_request(s, s->base);
         const double until = now() + patience_seconds();
-        while (!reaped(s->supervisor, LOOK_SECONDS) && now() < until)
+        const bool listens = listen_for_end();
+        while (!reaped(s->supervisor, LOOK_SECONDS) && now() < until && !interrupted)
             ;
+        if (listens)
+            listen_no_longer();
         const bool ended = atomic_load(&s->supervision->ended) == EXITED && s->supervision->code == PUT_AWAY;
-        if (!ended && atomic_load(&s->supervision->ended) == LIVES && now() >= until)
+        if (!ended && atomic_load(&s->supervision->ended) == LIVES && interrupted)
+            note_interrupted(s);
+        else if (!ended && atomic_load(&s->supervision->ended) == LIVES && now() >= until)
             note_overdue(s);
         else if (!ended)
             note_death(s, NULL);
@@ -227,6 +232,11 @@ EXPORT bool isolation_has(const char *name) {
 /* How the process ended; empty where none has. */
 EXPORT const char *isolation_reason(void) {
     return reason;
+}
+
+/* Whether it ended because a user asked for the end, and not for what the FMU did. */
+EXPORT bool isolation_interrupted(void) {
+    return interrupted != 0;
 }
 
 EXPORT const char *isolation_printed(void) {

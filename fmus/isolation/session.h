@@ -1,7 +1,7 @@
 /* One instance of an FMU in a process of its own, as the proxy sees it: how its process is started, waited for and ended, and what is
    known of its end. Part of `proxy.c`.
  */
-#include "pacing.h"
+#include "interruption.h"
 
 #include <spawn.h>
 
@@ -165,33 +165,50 @@ static void note_overdue(Session *s) {
     note_death(s, why);
 }
 
-/* Wait for what the process says next. False where it has ended, or took too long and was ended. */
-static bool await(Session *s) {
-    if (came_at_once(&s->pace, &s->answering->number, s->number))
-        return true;
-    const double until = now() + patience_seconds();
-    for (;;) {
+static void note_interrupted(Session *s) {
+    note_death(s, "did not return when the run was interrupted, and its process was ended");
+}
+
+/* Sleep until it says something, its end or ours has come. */
+static void sleep_for_answer(Session *s) {
+    double until = now() + patience_seconds();
+    for (bool asked = false;;) {
         atomic_store(&s->asking->sleeps, 1);
         const uint32_t seen = atomic_load(&s->answering->number);
         if (seen == s->number)
-            break;
+            return;
         if (atomic_load(&s->supervision->ended) != LIVES) {
             note_death(s, NULL);
-            break;
+            return;
         }
+        if (interrupted && !asked && now() + STILL_SECONDS < until)
+            until = now() + STILL_SECONDS;
+        asked = interrupted;
         const double left = until - now();
-        if (left <= 0.0) {
+        if (left <= 0.0 && asked)
+            note_interrupted(s);
+        else if (left <= 0.0)
             note_overdue(s);
-            break;
-        }
+        if (left <= 0.0)
+            return;
         sleep_while(&s->answering->number, seen, left < LOOK_SECONDS ? left : LOOK_SECONDS);
         siginfo_t gone = {0};
         if (waitid(P_PID, (id_t)s->supervisor, &gone, WEXITED | WNOHANG | WNOWAIT) != 0 || gone.si_pid != 0) {
             if (atomic_load(&s->answering->number) != s->number)
                 note_death(s, NULL);
-            break;
+            return;
         }
     }
+}
+
+/* Wait for what the process says next. False where it has ended, or took too long and was ended. */
+static bool await(Session *s) {
+    if (came_at_once(&s->pace, &s->answering->number, s->number))
+        return true;
+    const bool listens = listen_for_end();
+    sleep_for_answer(s);
+    if (listens)
+        listen_no_longer();
     atomic_store(&s->asking->sleeps, 0);
     if (s->dead)
         stop(s);
