@@ -19,6 +19,7 @@ from hypothesis import settings
 # Matrices here have a few rows: a second thread of BLAS makes `expm` of five rows 14 times as dear, and takes the core
 # of the other worker. It is said before NumPy is loaded, and inherited by workers and commands.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ["FMU_OBSERVER_ISOLATE"] = "no"  # the FMUs of the tests are their own, and a process costs a second
 os.environ.pop("COLUMNS", None)  # workers inherit it where readline has set it: tables are as wide as for a pipe
 
 # The tests start hundreds of commands, and each of these and each collection would compile anew what it loads: where

@@ -16,6 +16,8 @@ from cosim.comparison.common_change import common_changes
 from cosim.comparison.comparison import Comparison
 from cosim.comparison.tolerance import Tolerance, Tolerances
 from cosim.errors import BaselineError
+from cosim.runs.run_apart import isolated_unless_stated
+from cosim.scenario.scenario_tables import Isolate
 
 WORST = 20
 """Lines shown of a difference."""
@@ -48,6 +50,7 @@ class Call:
         tolerance: Any = None,
         tolerances: Mapping[str, Any] | None = None,
         ignore: Iterable[str] = (),
+        isolate: Isolate | None = None,
         **arguments: Any,
     ) -> Call:
         """Run what a test names.
@@ -61,6 +64,7 @@ class Call:
             tolerance: what is allowed of signals that are not named otherwise.
             tolerances: what is allowed, by name or pattern.
             ignore: names or patterns of what is not compared.
+            isolate: what runs in a process of its own where a scenario says nothing; None for the usual.
             arguments: further arguments of `make_subject`.
 
         Raises:
@@ -70,7 +74,7 @@ class Call:
         stated = tolerance is not None or tolerances or ignored
         wanted = _tolerances_of(Tolerances(), tolerance, tolerances, ignored) if stated else None  # before a long run
         chosen = None if signals is None else tuple(signals)
-        with after_its_delivery(path, what, folder):
+        with after_its_delivery(path, what, folder), isolated_unless_stated(isolate):
             return cls(make_subject(what, folder, **arguments), path, wanted, chosen, every)
 
     @property

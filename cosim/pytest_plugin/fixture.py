@@ -19,6 +19,7 @@ from cosim.pytest_plugin.records import Records, RegressionRecord, Status
 if TYPE_CHECKING:
     from cosim.baselines import Regression
     from cosim.baselines.call import Call
+    from cosim.scenario.scenario_tables import Isolate
 import re
 from hashlib import sha256
 
@@ -90,6 +91,7 @@ class FmuRegression:
         tolerances: Mapping[str, Any] | None = None,
         ignore: Iterable[str] = (),
         name: str | None = None,
+        isolate: Isolate | None = None,
     ) -> Regression:
         """Run and compare.
 
@@ -107,6 +109,8 @@ class FmuRegression:
             tolerance: for all signals: a number (share of the range), a `Tolerance` or a mapping with its keys.
             tolerances: for single signals, by name or pattern. ignore: names or patterns of signals not to compare.
             name: of this call, where a test makes several.
+            isolate: ``run`` for a process of the run, the default for FMUs of others, ``component`` for one of each
+                FMU, ``no`` for this one; where a scenario says something itself, that holds.
 
         Returns:
             The comparison, with `outcome` and `actual`: what ran.
@@ -119,7 +123,7 @@ class FmuRegression:
         run: dict[str, Any] = {"start": start, "stop": stop, "step": step, "overrides": overrides, "units": units}
         run |= {"inputs": inputs, "parameters": parameters, "record": record, "interpolation": interpolation}
         try:
-            call = Call.run(what, self._file.parent, path, **compared, **run)
+            call = Call.run(what, self._file.parent, path, isolate=isolate, **compared, **run)
             return self._update(call) if options.mode(self._config) == "update" else self._check(call)
         except (CosimError, ModuleNotFoundError) as error:
             reason = str(error) if isinstance(error, CosimError) else missing_package(error)

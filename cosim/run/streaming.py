@@ -62,16 +62,19 @@ def ending(
     folder: Path | None,
     warn: Callable[[str], None],
     finished: Callable[[Outcome], None] | None,
+    note: str = "",
 ) -> Callable[[Outcome], Outcome]:
     """What is done with an outcome before the components are closed.
 
     Args:
         origin: of the run. folder: that it was streamed to, or None. warn: called with each warning.
-        finished: notified of the outcome; None for nobody.
+        finished: notified of the outcome; None for nobody. note: one more of the run; empty for none.
     """
 
     def finish(outcome: Outcome) -> Outcome:
         outcome = replace(outcome, origin=origin)
+        if note:
+            outcome = outcome.with_summary(notes=[*outcome.result.summary.get("notes", []), note])
         outcome = outcome if folder is None else _finish_stream(outcome, folder, warn)
         if finished is not None:
             finished(outcome)

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cosim.components.description import read_description
 from cosim.errors import CosimError, RunError
 from cosim.run.outcome import INTERRUPTED, Outcome
 from cosim.runs.job import Ended, Failure, Job, pickled
 from cosim.runs.keys import digest, table_content
 from cosim.runs.runnable import RunnableScenario
 from cosim.scenario.origin import ForeignFile, Origin, foreign_files
+from fmus.fmi.standard import OWN_TOOL
 
 if TYPE_CHECKING:
     from cosim.scenario.schema import ScenarioTable
@@ -61,15 +64,31 @@ class Run(Job):
     @property
     def apart(self) -> bool:
         """Whether it may take its process along, for it calls native code of others or has calls that are limited in
-        time, and can be done in another one: a class that a script defines is not found there without the script, and
-        not all that it holds can be sent.
+        time, and can be done in another one.
         """
-        if not (self._calls_fmus or self._is_limited):
-            return False
+        return (self._calls_fmus or self._is_limited) and not self.bound_to_script
+
+    @property
+    def bound_to_script(self) -> str:
+        """Why it can be done in this process only, in words: a class that a script defines is not found elsewhere
+        without the script, and not all that it holds can be sent. Empty where it can be done elsewhere.
+        """
         try:
-            return b"__main__" not in pickled(self)
-        except RunError:
-            return False
+            return "a class or a function of the script is in it" if b"__main__" in pickled(self) else ""
+        except RunError as error:
+            return str(error).partition(". Run with")[0]
+
+    @property
+    def has_own_code(self) -> bool:
+        """Whether classes of the user's are in it, which may change between two runs."""
+        return bool(self._stated) or any(file.path.suffix == ".py" for file in self.files())
+
+    @property
+    def calls_foreign_fmus(self) -> bool:
+        """Whether FMUs are in it that were not built here and share its process with it."""
+        tables = self._table.components.values()
+        named = [table.fmu for table in tables if table.fmu is not None and table.isolate is None]
+        return any(_is_foreign(self.scenario.folder / name) for name in named)
 
     @property
     def _calls_fmus(self) -> bool:
@@ -141,6 +160,14 @@ class Run(Job):
     def __getstate__(self) -> dict[str, Any]:
         """Without what follows from the rest."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+
+def _is_foreign(path: Path) -> bool:
+    """Whether a file is an FMU of another tool; what cannot be read is none, and the run says why."""
+    try:
+        return bool(read_description(path).generationTool != OWN_TOOL)
+    except CosimError:
+        return False
 
 
 def _silent(_text: str) -> None: ...

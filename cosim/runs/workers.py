@@ -16,6 +16,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, suppress
+from math import isnan, nan
 from multiprocessing import spawn
 from multiprocessing.connection import Pipe, wait
 from pathlib import Path
@@ -55,6 +56,7 @@ class Team(AbstractContextManager["Team"]):
     def __init__(self, workers: int) -> None:
         self.workers = workers
         self._idle: list[_Worker] = []
+        self._busy: list[_Worker] = []
 
     def each(self, jobs: Iterable[Job], stopped: Callable[[], bool] = lambda: False) -> Iterator[tuple[Job, Ended]]:
         """One round.
@@ -69,7 +71,7 @@ class Team(AbstractContextManager["Team"]):
             RunError: a job cannot be sent to another process.
         """
         waiting = iter(jobs)
-        busy: list[_Worker] = []
+        busy = self._busy
 
         def occupy() -> None:
             while len(busy) < self.workers and (job := next(waiting, None)) is not None:
@@ -88,8 +90,19 @@ class Team(AbstractContextManager["Team"]):
                     occupy()  # before the answer is used, which may take long
                     yield job, ended
         finally:
-            for worker in busy:
-                worker.kill()
+            while busy:
+                busy.pop().kill()
+
+    def interrupt(self) -> None:
+        """Ctrl-C for jobs that hear it: they end by themselves."""
+        for worker in self._busy:
+            if os.name == "posix":
+                worker.process.send_signal(signal.SIGINT)
+
+    def reached(self) -> float | None:
+        """Where the calls of the present jobs are that is least far [s]; None where none is in a call with a time."""
+        times = [time for worker in self._busy if not isnan(time := worker.time)]
+        return min(times, default=None)
 
     def _worker_for(self, job: Job) -> _Worker:
         """A process that does this job now; one that does not know the script is exchanged where the job needs it."""
@@ -143,6 +156,11 @@ class _Worker:
         words = [json.dumps(value) for value in (theirs.fileno(), sys.path, str(page), script)]
         self.process = subprocess.Popen([sys.executable, "-c", _SERVE, *words], **_inherited(theirs.fileno()))
         theirs.close()  # so that the pipe ends when the process does
+
+    @property
+    def time(self) -> float:
+        """Of its present call [s]; NaN where it is in none, or in one without a time."""
+        return float(self._last.time[0]) if self._last.call[0] else nan
 
     def give(self, job: Job, data: bytes) -> None:
         """Hand it a job; where it has died already, that is found when the answer is read."""

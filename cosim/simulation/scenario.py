@@ -16,7 +16,7 @@ from cosim.run.scenario_run import run_scenario
 from cosim.run.scenario_structure import scenario_structure
 from cosim.run.streaming import ending, where_to
 from cosim.run.task import RunTask
-from cosim.runs.run_apart import run_apart
+from cosim.runs.run_apart import run_apart, where_it_runs
 from cosim.scenario.fmu_alone import FmuAlone, tables_of_fmu
 from cosim.scenario.includes import find_file, read_tables
 from cosim.scenario.origin import Origin
@@ -277,19 +277,24 @@ class Scenario(StatedScenario, FirstScreen):
             scenario.master(log_calls=True)
         table = scenario.table()
         log = None if call_log is None else Path(call_log)
-        if table.master.isolate == "run" and not LAST_CALL.watched:
-            with self._places_named():
-                outcome = run_apart(scenario, warn or LOG.warning, None if stream is None else Path(stream), log)
+        isolate, why_here = where_it_runs(scenario)
+        if isolate == "run" and not LAST_CALL.watched:
+            where = None if stream is None else Path(stream)
+            with self._places_named(), reported(progress, shape=SIMULATED_TIME) as report:
+                outcome = run_apart(scenario, warn or LOG.warning, where, log, report)
             if finished is not None:
                 finished(outcome)
             return outcome
+        if isolate != table.master.isolate:
+            scenario.master(isolate=isolate)
+            table = scenario.table()
         for warning in self._warnings:
             (warn or LOG.warning)(warning)
         with self._places_named():
             task = RunTask(table, scenario.name, self.folder, self.where)
             origin = Origin.of(table, task.name, task.folder, task.where, self._files)
             folder, streaming = where_to(stream, fallback, origin)
-            finish = ending(origin, folder, warn or LOG.warning, finished)
+            finish = ending(origin, folder, warn or LOG.warning, finished, why_here)
             with reported(progress, shape=SIMULATED_TIME) as report:
                 return run_scenario(task, report, warn, log, building, streaming, self._warnings, finish)
 

@@ -10,6 +10,8 @@ from test_fmus.events import DEEDS, hostile_fmu
 
 from cosim import Scenario, load_result
 from cosim.errors import CosimError
+from cosim.runs.run_apart import isolated_unless_stated, where_it_runs
+from plant_models.hybrid import HybridSystem, output_signal
 
 pytestmark = [pytest.mark.compiler, pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="Linux")]
 
@@ -51,3 +53,70 @@ def test_what_was_streamed_is_where_it_was_asked_for(tmp_path: Path) -> None:
 def test_what_cannot_begin_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(CosimError, match="nothing"):
         hostile(tmp_path, "nothing").connect("bad.nothing -> bad.y").run(warn=lambda _: None)
+
+
+@pytest.fixture
+def nothing_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("FMU_OBSERVER_ISOLATE")
+    monkeypatch.setenv("FMU_OBSERVER_CACHE", str(tmp_path / "cache"))  # where an FMU that crashed is remembered
+
+
+def plain(folder: Path, deed: str = "nothing", **component: Any) -> Scenario:
+    parameters = {"deed": float(DEEDS.index(deed))}
+    scenario = Scenario(stop=0.5, step=0.01)
+    return scenario.add("bad", fmu=str(hostile_fmu(folder)), parameters=parameters, **component)
+
+
+@pytest.mark.usefixtures("nothing_said")
+def test_where_nothing_is_said_an_fmu_of_others_takes_no_script_along(tmp_path: Path) -> None:
+    reached: list[float] = []
+    ended = plain(tmp_path, "crashes").run(warn=lambda _: None, progress=lambda t, _: reached.append(t))
+    assert "SIGSEGV" in str(ended.failure)
+    assert len(ended.result.table) == 25
+    assert all(0.0 <= t <= 0.5 for t in reached)
+
+
+@pytest.mark.usefixtures("nothing_said")
+def test_where_a_run_is_made_follows_from_what_is_said_the_nearest_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert where_it_runs(plain(tmp_path)) == ("run", "")
+    assert where_it_runs(plain(tmp_path, isolate="component")) == (None, "")  # each has its own
+    assert where_it_runs(Scenario(stop=1.0, step=0.1).add("train", model="locomotive")) == (None, "")
+    monkeypatch.setenv("FMU_OBSERVER_ISOLATE", "no")
+    assert where_it_runs(plain(tmp_path)) == (None, "")
+    with isolated_unless_stated("component"):
+        assert where_it_runs(plain(tmp_path)) == ("component", "")
+        with isolated_unless_stated(None):
+            assert where_it_runs(plain(tmp_path)) == ("component", "")
+        assert where_it_runs(plain(tmp_path).master(isolate="run")) == ("run", "")
+    monkeypatch.setenv("FMU_OBSERVER_ISOLATE", "never")
+    with pytest.raises(CosimError, match="FMU_OBSERVER_ISOLATE is 'never'; expected one of no, run, component"):
+        plain(tmp_path).run()
+
+
+@pytest.mark.usefixtures("nothing_said")
+def test_what_cannot_be_sent_runs_here_and_a_note_says_so(tmp_path: Path) -> None:
+    class Local(HybridSystem):
+        name, description, source = "local", "known to this function", "a test"
+        outputs = (output_signal("y", "1"),)
+
+        def output(self, t: Any, x: Any, u: Any, p: Any) -> dict[str, Any]:
+            return {"y": t}
+
+    scenario = plain(tmp_path).add("local", model=Local)
+    outcome = scenario.run(warn=lambda _: None)
+    assert outcome.failure is None
+    assert "share the process of the script" in " ".join(outcome.result.summary["notes"])
+
+
+@pytest.mark.usefixtures("nothing_said")
+def test_an_error_of_the_setup_is_the_same_wherever_it_is_found(tmp_path: Path) -> None:
+    wrong = plain(tmp_path)
+    next(tmp_path.rglob("*.fmu")).unlink()
+    errors = []
+    for isolate in ("run", "no"):
+        with isolated_unless_stated(isolate), pytest.raises(CosimError) as found:  # type: ignore[arg-type]
+            wrong.run(warn=lambda _: None)
+        errors.append((type(found.value), str(found.value)))
+    assert errors[0] == errors[1]
