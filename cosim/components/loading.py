@@ -240,7 +240,8 @@ def load_fmu(
     except NotAnFmuError as error:
         raise FmuLoadError(f"{name}: {error}") from error
     guard_exit()
-    LAST_CALL.state_content(name, file_digest(path))
+    if isolation is None:
+        LAST_CALL.state_content(name, file_digest(path))
     folder, slave, changed = _loaded_in_peace(archive, path, name, kind, isolation)
     more = {"negated": negated_aliases(folder)} if fmi_version(description) == 1 else {}
     component: Component = COMPONENTS[fmi_version(description)](

@@ -201,6 +201,12 @@ class LastCall:
         stated = [what for name, _, what in (line.partition("\0") for line in lines) if name == component]
         return next((what.removeprefix(_CONTENT) for what in reversed(stated) if what.startswith(_CONTENT)), "")
 
+    @property
+    def code_of_others(self) -> list[str]:
+        """Names of the components whose files were stated, in order."""
+        named = [line.partition("\0") for line in self._lines()]
+        return list(dict.fromkeys(name for name, _, what in named if what.startswith(_CONTENT)))
+
     def _lines(self) -> list[str]:
         return self.memory[TEXTS : TEXTS + self._cells[USED]].decode("utf-8", "replace").split("\n")[:-1]
 

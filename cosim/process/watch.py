@@ -32,10 +32,6 @@ GRACE = 3.0
 
 _CLOSED = 256
 """Said in place of an exit code where what the process had opened was closed by somebody else."""
-_WHO_CLOSED = (
-    "an FMU closed files that this program had open: its standard streams, or its results. 'fmus check' finds which FMU"
-)
-
 _FROM_OUTSIDE = (-signal.SIGTERM, -signal.SIGINT, -9)
 """Ends of a process that are no deed of an FMU: SIGTERM, SIGINT, SIGKILL."""
 _PARENT_DEATH = 1  # prctl: PR_SET_PDEATHSIG
@@ -144,7 +140,7 @@ class _Watch:
         code = LAST_CALL.exit_code
         if code is not None and code != _CLOSED:
             return code
-        reason = _WHO_CLOSED if code == _CLOSED else self._reason(status)
+        reason = _who_closed() if code == _CLOSED else self._reason(status)
         if sys.stderr.isatty():
             print(file=sys.stderr)  # there may be a progress bar
         print(f"cosim: {reason}.", file=sys.stderr)
@@ -212,6 +208,13 @@ class _Watch:
             print(salvage(note, reason), file=sys.stderr)
         elif "written" in note:
             print(f"The results were written before: {note['written']}", file=sys.stderr)
+
+
+def _who_closed() -> str:
+    names = ", ".join(map(repr, LAST_CALL.code_of_others))
+    who = f"an FMU of the components {names}" if "," in names else f"the FMU of component {names}" if names else "an FMU"
+    more = ". 'fmus check' finds which FMU, and isolate = 'component' keeps it" if "," in names else ""
+    return f"{who} closed files that this program had open: its standard streams, or its results{more}"
 
 
 def _how_it_ended(code: int) -> str:

@@ -117,7 +117,7 @@ def test_who_closes_the_files_of_the_program_is_told_and_loses_no_row(
 ) -> None:
     """Rows are in a map of memory, which no descriptor is needed for."""
     said = reported(start(fmu, tmp_path, deed, *options))
-    assert "an FMU closed files that this program had open" in said
+    assert "the FMU of component 'bad' closed files that this program had open" in said
     result = load_result(tmp_path / "out")
     assert (result.failure or "").startswith("the run did not end")
     assert result.time[-1] >= 0.24  # where it closed them
