@@ -211,9 +211,9 @@ class _Watch:
 
 
 def _who_closed() -> str:
-    names = ", ".join(map(repr, LAST_CALL.code_of_others))
-    who = f"an FMU of the components {names}" if "," in names else f"the FMU of component {names}" if names else "an FMU"
-    more = ". 'fmus check' finds which FMU, and isolate = 'component' keeps it" if "," in names else ""
+    names = list(map(repr, LAST_CALL.code_of_others))
+    who = f"the FMU of component {names[0]}" if len(names) == 1 else f"an FMU ({', '.join(names)})"
+    more = "" if len(names) == 1 else ". 'fmus check' finds which FMU, and isolate = 'component' keeps it"
     return f"{who} closed files that this program had open: its standard streams, or its results{more}"
 
 
