@@ -110,7 +110,8 @@ class GapErrors:
         """
         if not self.gaps:
             return nan
-        return float(np.mean(np.abs(self.errors[name]) <= [gap.envelope for gap in self.gaps]))
+        granted = envelope(np.array([gap.length for gap in self.gaps]))
+        return float(np.mean(np.abs(self.errors[name]) <= granted))
 
     def to_data(self) -> dict[str, Any]:
         """Plain data for a summary: the longest gaps with all errors, and what all gaps come to."""
@@ -164,17 +165,18 @@ def gap_errors(result: Result, spec: ReportSpec) -> GapErrors:
     times = np.array([event.delivered_at for event in telegrams])
     rows = rows_before(result.time, times)
     speed = recorded(result, spec.true_speed)
-    way, evaluated = travelled(place), np.flatnonzero(times[1:] >= spec.evaluate_after) + 1
+    evaluated = np.flatnonzero(times[1:] >= spec.evaluate_after) + 1
+    lengths = _lengths(result.time, place, [telegrams[i - 1] for i in evaluated], rows[evaluated])
     gaps = [
         Gap(
             telegrams[i - 1].identity,
             telegrams[i].identity,
             float(times[i - 1]),
             float(times[i]),
-            _length(result.time, place, way, telegrams[i - 1], rows[i]),
+            length,
             nan if speed is None else float(speed[rows[i]]),
         )
-        for i in evaluated
+        for i, length in zip(evaluated.tolist(), lengths, strict=True)
     ]
     errors = _errors_at(result, spec, rows, evaluated, place)
     labels = {name: PLAIN_ODOMETER if name == PLAIN_ODOMETER else label(spec, name) for name in errors}
@@ -190,10 +192,12 @@ def travelled(place: np.ndarray) -> np.ndarray:
     return np.concatenate(([0.0], np.cumsum(np.abs(np.diff(place)))))
 
 
-def _length(time: np.ndarray, place: np.ndarray, way: np.ndarray, passed: BaliseRecord, row: int) -> float:
-    """Way from the passing of a balise to a row [m]."""
-    first = min(int(np.searchsorted(time, passed.stamp)), row)
-    return float(abs(place[first] - passed.true_position) + way[row] - way[first])
+def _lengths(time: np.ndarray, place: np.ndarray, passed: Sequence[BaliseRecord], rows: np.ndarray) -> list[float]:
+    """Ways from the passing of a balise each to a row each [m]."""
+    way, there = travelled(place), np.array([telegram.true_position for telegram in passed])
+    first = np.minimum(np.searchsorted(time, np.array([telegram.stamp for telegram in passed])), rows)
+    lengths: list[float] = (np.abs(place[first] - there) + way[rows] - way[first]).tolist()
+    return lengths
 
 
 def _errors_at(

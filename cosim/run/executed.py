@@ -105,8 +105,9 @@ def _warnings_after(
         rejected = (component.outcomes() or {}).get("rejected", 0)
         if rejected:
             yield f"{name}: {rejected} telegrams were rejected: stamped in the past, and beyond what it replays."
+    doubted = [telegram for telegram in telegrams if not _DOUBTS.keys().isdisjoint(telegram.outcomes.values())]
     for name in components:
-        yield from _doubted(name, telegrams)
+        yield from _doubted(name, doubted)
     for name, component in components.items():
         if component.call_warnings:
             yield f"{name} returned the status warning, and the run went on: {component.call_warnings}."
