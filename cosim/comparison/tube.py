@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from cosim.comparison.curve import BESIDE, Curve
+
+_AT_A_TIME = 1 << 14
+"""Rows whose bands are looked for together: what is kept in between does not grow with their number."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +40,23 @@ def band_of(
         curve: the finer curve. at: instants [s], shape (m,). tolerance: [s].
         first, last: rows first <= row < last of the piece that belongs to each instant; the whole curve if left out.
     """
+    low, high, evaluated = np.empty(len(at)), np.empty(len(at)), np.empty(len(at), dtype=bool)
+    last = len(curve.time) if last is None else last
+    where = [np.broadcast_to(np.asarray(each), at.shape) for each in (at, tolerance, first, last)]
+    for some in _slices(len(at)):
+        low[some], high[some], evaluated[some] = _band_rows(curve, *(each[some] for each in where))
+    return _TubeBand(low, high, evaluated)
+
+
+def _slices(count: int) -> Iterator[slice]:
+    return (slice(start, start + _AT_A_TIME) for start in range(0, count, _AT_A_TIME))
+
+
+def _band_rows(
+    curve: Curve, at: np.ndarray, tolerance: np.ndarray, first: np.ndarray, last: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lowest and highest values of some instants, and where there are any."""
     time, values = curve.time, curve.filled
-    first = np.broadcast_to(np.asarray(first), at.shape)
-    last = np.broadcast_to(np.asarray(len(time) if last is None else last), at.shape)
     begin, end = time[first], time[np.minimum(last, len(time) - 1) if curve.held else last - 1]
     low, high = np.maximum(at - tolerance, begin), np.minimum(at + tolerance, end)
     evaluated = low <= high
@@ -48,7 +66,7 @@ def band_of(
     a = np.maximum(np.searchsorted(time, low), first)
     b = np.minimum(np.searchsorted(time, high, side="right"), last)
     smallest, largest = _range_extremes(values, a, b)
-    return _TubeBand(np.minimum.reduce([*ends, smallest]), np.maximum.reduce([*ends, largest]), evaluated)
+    return np.minimum.reduce([*ends, smallest]), np.maximum.reduce([*ends, largest]), evaluated
 
 
 def widen_at_ends(
@@ -94,17 +112,29 @@ def held_band(curve: Curve, tolerance: float, first: np.ndarray, last: np.ndarra
         curve: the curve, on the rows of the other. tolerance: [s]. first, last: as in `band_of`, for each row.
         late: how much later a change of the other is, where both have it [s].
     """
-    time = curve.time
-    until = np.append(time[1:], time[-1])
-    begin, middle = (band_of(curve, at, tolerance, first, last) for at in (time, 0.5 * (time + until)))
+    until = np.append(curve.time[1:], curve.time[-1])
+    low, high, evaluated = np.empty(len(until)), np.empty(len(until)), np.empty(len(until), dtype=bool)
+    for some in _slices(len(until)):
+        where = curve.time[some], until[some], tolerance, first[some], last[some]
+        low[some], high[some], evaluated[some] = _held_rows(curve, *where)
+    if _is_apart(curve, max(tolerance, late)):
+        low[-1] = high[-1] = curve.filled[-1]
+    return _TubeBand(np.minimum(low, high), high, evaluated)
+
+
+def _held_rows(
+    curve: Curve, at: np.ndarray, until: np.ndarray, tolerance: float, first: np.ndarray, last: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of some rows, from `at` to `until` [s], the largest of the lowest values, the smallest of the highest, and where
+    there are any.
+    """
+    begin, middle = (band_of(curve, instants, tolerance, first, last) for instants in (at, 0.5 * (at + until)))
     end = _band_before(curve, until, tolerance, first, last)
-    holds = until > time
+    holds = until > at
     evaluated = np.stack([begin.evaluated, middle.evaluated & holds, end.evaluated & holds])
     low = np.max(np.where(evaluated, [begin.low, middle.low, end.low], -np.inf), axis=0)
     high = np.min(np.where(evaluated, [begin.high, middle.high, end.high], np.inf), axis=0)
-    if _is_apart(curve, max(tolerance, late)):
-        low[-1] = high[-1] = curve.filled[-1]
-    return _TubeBand(np.minimum(low, high), high, np.asarray(evaluated.any(axis=0)))
+    return low, high, evaluated.any(axis=0)
 
 
 def _is_apart(curve: Curve, reach: float) -> bool:
@@ -157,7 +187,8 @@ def _value(curve: Curve, at: np.ndarray, first: np.ndarray, last: np.ndarray) ->
 def _range_extremes(values: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Smallest and largest of values[a:b] for each range; +inf and -inf for an empty one."""
     low, high = np.full(a.shape, np.inf), np.full(a.shape, -np.inf)
-    length = b - a
+    from_row = int(np.min(a, initial=len(values)))
+    values, length, a, b = values[from_row : int(np.max(b, initial=0))], b - a, a - from_row, b - from_row
     smallest = largest = values
     power = 1
     while power <= np.max(length, initial=0):  # smallest[k] is that of values[k : k + power]

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pyfunnel  # type: ignore[import-untyped]
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cosim.comparison import tube
 from cosim.comparison.curve import Curve
 from cosim.comparison.tube import band_of, held_band
 
@@ -55,6 +57,27 @@ def test_pieces_are_bands_of_their_own(line: tuple[np.ndarray, np.ndarray], tole
     assert np.array_equal(band.low[:n], alone.low)
     assert np.array_equal(band.high[:n], alone.high)
     assert np.all(band.low[n:] >= 9.0)
+
+
+@given(lines(), st.floats(0.0, 3.0), st.booleans(), st.integers(1, 5))
+def test_how_many_rows_are_looked_at_together_changes_no_bit(
+    line: tuple[np.ndarray, np.ndarray], tolerance: float, held: bool, count: int
+) -> None:
+    """The bands at the rows themselves, and of a held curve those that hold all the time of a row."""
+    curve = Curve(*line, held)
+    first, last = np.zeros(len(line[0]), dtype=int), np.full(len(line[0]), len(line[0]))
+
+    def bands() -> list[np.ndarray]:
+        found = [band_of(curve, curve.time, tolerance, first, last)]
+        found += [held_band(curve, tolerance, first, last)] if held else []
+        return [array for band in found for array in (band.low, band.high, band.evaluated)]
+
+    whole = bands()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tube, "_AT_A_TIME", count)
+        parts = bands()
+    for one, two in zip(whole, parts, strict=True):
+        np.testing.assert_array_equal(one, two)
 
 
 def test_beyond_the_ends_nothing_is_evaluated() -> None:
