@@ -38,7 +38,9 @@ typedef struct {
     double spoiled;  /* LIE_RESET_KEEPS: survives a reset */
     int logging;
     int has_thread;     /* LIE_THREAD: one writes its outputs between the calls, */
+    pthread_t thread;
     volatile int freed; /* until this is set */
+    int initialised;    /* LIE_REFUSES_EARLY_READING */
 } Instance;
 
 static double announced_end; /* LIE_STRICT_END, which is no lie: no step goes beyond it, not by a rounding */
@@ -161,11 +163,11 @@ void fmi2FreeInstance(fmi2Component c) {
 #ifdef LIE_CRASH_FREED
     *(volatile int *)(size_t)8 = 1;
 #endif
-#ifdef LIE_THREAD /* it may still write once */
-    ((Instance *)c)->freed = 1;
-#else
+    Instance *instance = c;
+    instance->freed = 1;
+    if (instance->has_thread) /* it runs no code of a library that is unloaded */
+        pthread_join(instance->thread, NULL);
     free(c);
-#endif
 }
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real tol, fmi2Real start, fmi2Boolean sd, fmi2Real stop) {
     DATA(c).time = start;
@@ -177,6 +179,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 #if defined LIE_REFUSES_START || defined LIE_ESCAPES
     return fmi2Error;
 #endif
+    ((Instance *)c)->initialised = 1;
     return fmi2OK;
 }
 fmi2Status fmi2Terminate(fmi2Component c) {
@@ -192,6 +195,7 @@ fmi2Status fmi2Terminate(fmi2Component c) {
 fmi2Status fmi2Reset(fmi2Component c) {
     Instance *instance = c;
     instance->spoiled = 0.1;
+    instance->initialised = 0;
     begin(instance);
     return fmi2OK;
 }
@@ -200,6 +204,10 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
     Data *d = &DATA(c);
+#ifdef LIE_REFUSES_EARLY_READING
+    if (!((Instance *)c)->initialised)
+        return fmi2Error;
+#endif
     for (size_t i = 0; i < n; i++) {
 #ifdef LIE_GETTER
         if (vr[i] == RATE)
@@ -359,11 +367,8 @@ static void do_harm(Instance *instance) {
     ((char *)malloc(100000000))[0] = 1;
 #endif
 #ifdef LIE_THREAD
-    pthread_t thread;
-    if (!instance->has_thread && pthread_create(&thread, NULL, write_on, instance) == 0) {
-        instance->has_thread = 1;
-        pthread_detach(thread);
-    }
+    if (!instance->has_thread)
+        instance->has_thread = pthread_create(&instance->thread, NULL, write_on, instance) == 0;
 #endif
 }
 

@@ -89,6 +89,12 @@ def test_the_honest_one_passes_clean(tmp_path: Path) -> None:
             LIMIT,
             "the first step moves nothing, the second as much as the third: position",
         ),
+        (
+            "REFUSES_EARLY_READING",
+            "reading at initialisation",
+            DISTRUST,
+            "outputs cannot be read in Initialization Mode",
+        ),
         ("INPUT_LATE", "input at once", LIMIT, "acts in the one after it, on speed"),
         ("OTHER_START", "declared start values", LIMIT, "speed begins with 2, not with 1 as it is declared"),
         ("LEAKS_MEMORY", "repeated instantiation", LIMIT, "leaks memory"),

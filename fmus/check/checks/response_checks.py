@@ -1,10 +1,10 @@
-"""Checks of when an FMU responds: to its first step, to an input, and to the start values that it declares."""
+"""Checks of when an FMU responds: to its first step, to an input, to being read early, and to declared start values."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from fmus.check.check import LIMIT, Check
+from fmus.check.check import DISTRUST, LIMIT, Check
 from fmus.check.checked_instance import SlaveError
 from fmus.check.checks.life_checks import by, listed
 from fmus.check.context import Context
@@ -111,6 +111,32 @@ class DeclaredStartsCheck(
             found = [one for one in not_taken(component, stated) if one.name in wrong]
         texts = [f"{n.name} begins with {n.has:.6g}, not with {n.stated:.6g} as it is declared" for n in found]
         return by(listed(texts), f"{len(stated)} outputs begin with what is declared")
+
+
+class EarlyReadingCheck(Check, failing=DISTRUST, place=4.4):
+    """Outputs can be read in Initialization Mode, as each run does to bring outputs and inputs into agreement."""
+
+    name = "reading at initialisation"
+
+    @staticmethod
+    def run(context: Context) -> CheckOutcome:
+        refused: list[str] = []
+        with context.quiet_runner() as runner:
+            slave = runner.component
+
+            def read() -> None:
+                try:
+                    slave.read(slave.names("output"))
+                except SlaveError as error:
+                    refused.append(str(error))
+
+            try:
+                runner.begin(excited=False, meanwhile=read)
+            except SlaveError:
+                if not refused:  # else it follows from that
+                    raise
+        problem = f"outputs cannot be read in Initialization Mode: {refused[0]}" if refused else ""
+        return by(problem, "outputs can be read in Initialization Mode")
 
 
 def _declared(context: Context) -> dict[str, float]:
