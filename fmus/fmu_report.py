@@ -51,11 +51,11 @@ _COLUMNS = (
 )
 
 
-def describe_file(path: Path) -> dict[str, Any]:
+def describe_file(path: Path, description: ModelDescription | None = None) -> dict[str, Any]:
     """What an FMU says of itself, as plain data: version, interfaces, capabilities, platforms, variables.
 
     Args:
-        path: an FMU file.
+        path: an FMU file. description: what is taken for its own one, where that is known already.
 
     Raises:
         ValueError: the file is not an FMU.
@@ -63,7 +63,7 @@ def describe_file(path: Path) -> dict[str, Any]:
     try:
         with zipfile.ZipFile(path) as archive:
             platforms, names = _platforms(archive), archive.namelist()
-        description = read_description(path)
+        description = description or read_description(path)
     except Exception as error:
         raise ValueError(f"{path} cannot be read as an FMU: {_reason(error)}") from error
     return {

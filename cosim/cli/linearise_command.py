@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 
 import fmu_observer
@@ -10,7 +11,9 @@ import plant_models
 from cosim.cli.arguments import positive_number, settings_argument
 from cosim.cli.model_info import in_own_words
 from cosim.cli.scenarios import parse_setting, setting_number
+from cosim.cli.stated_units import UNIT, stated_of
 from cosim.components.loading import describe_fmu
+from cosim.components.stated_units import StatedUnit
 from cosim.errors import ScenarioError, nearest
 from cosim.fmu_model.exact import linearise_system
 from cosim.fmu_model.linearisation import Linearisation
@@ -71,6 +74,7 @@ ARGUMENTS = (
         metavar="SECONDS",
         help="communication step of a co-simulation (default: 0.01)",
     ),
+    UNIT,
     argument("-o", "--output", type=Path, metavar="FILE", help="write .json, .npz or .mat"),
 )
 
@@ -85,13 +89,14 @@ def execute(options: argparse.Namespace) -> Output:
         raise ScenarioError(f"--at {options.at:g}: expected an instant from 0 s on.")
     settings = {name: setting_number("--set", name, value) for name, value in map(parse_setting, options.settings)}
     is_file = str(options.model).lower().endswith(".fmu")
-    found = _of_fmu(options, settings) if is_file else _of_model(options, settings)
+    stated = stated_of(options.model, options.unit)
+    found = _of_fmu(options, settings, stated) if is_file else _of_model(options, settings)
     if options.output is not None:
         found.save(options.output)
     return Output(found.parts(), found.to_dict())
 
 
-def _of_fmu(options: argparse.Namespace, settings: dict[str, float]) -> Linearisation:
+def _of_fmu(options: argparse.Namespace, settings: dict[str, float], stated: Mapping[str, StatedUnit]) -> Linearisation:
     if options.preset is not None:
         raise ScenarioError("--preset belongs to models of ours; set the parameters of an FMU by --set NAME=VALUE.")
     described = describe_fmu(options.model, Path(options.model).stem)
@@ -108,6 +113,7 @@ def _of_fmu(options: argparse.Namespace, settings: dict[str, float]) -> Linearis
         outputs=options.outputs,
         interface=options.interface,
         step=options.step,
+        units=stated,
     )
 
 

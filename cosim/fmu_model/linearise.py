@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.components.stated_units import NONE_STATED, StatedUnit
 from cosim.errors import nearest
 from cosim.fmu_model.exchange import ExchangeModel
 from cosim.fmu_model.linearisation import Linearisation, Method
@@ -45,6 +46,7 @@ def linearise_fmu(
     outputs: list[str] | None = None,
     interface: Interface | None = None,
     step: float = 0.01,
+    units: Mapping[str, StatedUnit] = NONE_STATED,
 ) -> Linearisation:
     """Matrices A, B, C, D of an FMU at a point.
 
@@ -61,6 +63,7 @@ def linearise_fmu(
         by_inputs: inputs of B and D; None for all real ones. outputs: those of C and D; None for all real ones.
         interface: ``model-exchange`` or ``co-simulation``; None for model exchange where the FMU has it.
         step: communication step of a co-simulation [s].
+        units: what is stated of its variables, by name; numbers stay those of the FMU itself.
 
     Returns:
         The linearisation.
@@ -68,7 +71,7 @@ def linearise_fmu(
     Raises:
         FmuLoadError: the FMU cannot be opened. FmuModelError: it has no states, or a name is unknown.
     """
-    model = _opened(path, interface, states=state_names, outputs=outputs, parameters=parameters)
+    model = _opened(path, interface, states=state_names, outputs=outputs, parameters=parameters, units=units)
     try:
         u = _filled(model, "input", model.inputs, model.start_inputs, inputs or {})
         x = model.start.copy()

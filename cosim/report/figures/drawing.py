@@ -19,18 +19,22 @@ from fmus.tables.numbers import number
 _BUCKETS = 1500  # more points than a picture has columns add nothing but time and bytes
 _MARGINS = 1.0  # width of a figure beside its axes [inch]
 _LETTER_WIDTH, _HANDLE_WIDTH = 0.069, 0.66  # of a letter and of a line with the space around it in a legend [inch]
+SPEED = ShownUnit("km/h", 1.0 / 3.6, 0.0, "m/s")
+"""Of an axis of speeds none of which has a unit; likewise of forces and of slips."""
+FORCE, SLIP = ShownUnit("N", kept="N"), ShownUnit()
 FAR = 50.0  # values are cut this many axis heights away, so that a line to 1e300 can still be drawn
 
 
-def speed_unit(result: Result, names: Iterable[str | None]) -> ShownUnit:
-    """The unit of an axis of speeds: that in which all are shown, else m/s; km/h where no signal has a unit.
+def axis_unit(result: Result, names: Iterable[str | None], otherwise: ShownUnit) -> ShownUnit:
+    """The unit of an axis of signals of one kind: that in which all are shown, else the one in which they are kept.
 
     Args:
         result: the run. names: of the signals; what was not recorded does not count.
+        otherwise: where none has a unit; that of pure numbers where it is one.
     """
-    known = {signal.name: signal.shown for signal in result.signals if signal.unit != "1"}
+    known = {s.name: s.shown for s in result.signals if s.unit != "1" or otherwise.kept == "1"}
     found = [known[name] for name in names if name in known]
-    return shared_unit(found) if found else ShownUnit("km/h", 1.0 / 3.6, 0.0, "m/s")
+    return shared_unit(found) if found else otherwise
 
 
 def thin(time: np.ndarray, values: np.ndarray, buckets: int = _BUCKETS) -> tuple[np.ndarray, np.ndarray]:

@@ -12,9 +12,19 @@ from matplotlib.figure import Figure
 
 from cosim.drawing.style import TIME, TRUE_LINE, new_figure, picture, run_line, styled
 from cosim.evaluation.roles import Quantity, estimate, estimation_error, label, recorded
-from cosim.report.figures.drawing import curve, legend_above, mark_evaluation, shade_zones, speed_unit, thin
+from cosim.report.figures.drawing import (
+    FORCE,
+    SLIP,
+    SPEED,
+    axis_unit,
+    curve,
+    legend_above,
+    mark_evaluation,
+    shade_zones,
+    thin,
+)
 from cosim.report.figures.error_figures import ErrorCurve, draw_errors
-from cosim.report.figures.scales import bounded, value_limits
+from cosim.report.figures.scales import bounded, drawn, value_limits
 from cosim.report.overlay.overlaid_runs import OverlayRun, observers_of, one_each
 from cosim.results.shown_unit import ShownUnit, shared_unit
 
@@ -75,7 +85,7 @@ def _true_speed_figure(runs: Sequence[OverlayRun]) -> Figure | None:
     if not found:
         return None
     ax = _axes(runs, [("", {})])[0]
-    unit = shared_unit(speed_unit(run.result, [run.spec.true_speed]) for _, run, _ in found)
+    unit = shared_unit(axis_unit(run.result, [run.spec.true_speed], SPEED) for _, run, _ in found)
     limits = value_limits([unit.values(bounded(speed)) for _, _, speed in found], [])
     for i, run, speed in found:
         curve(ax, run.result.time, unit.values(bounded(speed)), limits, label=run.label, **run_line(i))
@@ -100,24 +110,29 @@ def _error_overlay(runs: Sequence[OverlayRun], quantity: Literal["speed", "posit
 
 @styled
 def _estimate_overlay(runs: Sequence[OverlayRun], signal: Literal["slip", "adhesion_force"]) -> Figure | None:
-    """Estimates of the slip [%] or the adhesion force [kN], a panel for each observer, or None without any."""
-    factor, text = (100.0, "Slip [%]") if signal == "slip" else (1e-3, "Adhesion force [kN]")
+    """Estimates of the slip or the adhesion force in the unit in which they are shown, a panel for each observer, or
+    None without any.
+    """
+    text, otherwise = ("Slip", SLIP) if signal == "slip" else ("Adhesion force", FORCE)
     panels = _panels(runs, lambda run, observer: estimate(run.result, observer, signal) is not None)
     if not panels:
         return None
     axes = _axes(runs, panels)
-    true = recorded(runs[0].result, runs[0].spec.true_slip if signal == "slip" else runs[0].spec.true_adhesion_force)
-    anchors = [] if true is None else [factor * bounded(true)]
+    name = getattr(runs[0].spec, f"true_{signal}")
+    shown = [(runs[i].result, f"{observer}.{signal}") for _, members in panels for i, observer in members.items()]
+    unit = shared_unit(axis_unit(result, [one], otherwise) for result, one in [(runs[0].result, name), *shown])
+    true = recorded(runs[0].result, name)
+    anchors = [] if true is None else [drawn(true, unit)]
     for ax, (_, members) in zip(axes, panels, strict=True):
-        values = {i: factor * bounded(runs[i].result[f"{observer}.{signal}"]) for i, observer in members.items()}
+        values = {i: drawn(runs[i].result[f"{observer}.{signal}"], unit) for i, observer in members.items()}
         limits = value_limits(
             anchors, [v[runs[i].result.time >= runs[i].spec.evaluate_after] for i, v in values.items()]
         )
         for band in anchors:
             curve(ax, runs[0].result.time, band, limits, label="true", **TRUE_LINE)
-        for i, drawn in values.items():
-            curve(ax, runs[i].result.time, drawn, limits, label=runs[i].label, **run_line(i))
-        ax.set_ylabel(text)
+        for i, line in values.items():
+            curve(ax, runs[i].result.time, line, limits, label=runs[i].label, **run_line(i))
+        ax.set_ylabel(f"{text} [{unit.name}]")
         if limits is not None:
             ax.set_ylim(*limits)
     return _finished(axes)

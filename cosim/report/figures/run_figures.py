@@ -24,13 +24,12 @@ from cosim.drawing.style import (
 from cosim.evaluation.indicators import on_intervals
 from cosim.evaluation.roles import estimate, label, recorded
 from cosim.evaluation.spec import ReportSpec
-from cosim.report.figures.drawing import curve, shade_zones, speed_unit
+from cosim.report.figures.drawing import FORCE, SLIP, SPEED, axis_unit, curve, shade_zones
 from cosim.report.figures.panel import Panel, any_estimate
-from cosim.report.figures.scales import bounded, curve_size, slip_in_percent, value_limits
+from cosim.report.figures.scales import curve_size, drawn, value_limits
 from cosim.results.result import Result
 from cosim.results.shown_unit import ShownUnit
 
-_PLAIN, _KN = ShownUnit(), ShownUnit("kN", 1e3, 0.0, "N")
 _OTHER_LINE: dict[str, Any] = {"color": BLACK, "linewidth": 1.2}
 _DASHES: tuple[Any, ...] = ("--", "-.", (0, (6, 2)), (0, (3, 1, 1, 1, 1, 1)))  # of other trains
 _STRIP = 0.055  # height of an indicator's strip as a share of the axes
@@ -38,12 +37,12 @@ _STRIP = 0.055  # height of an indicator's strip as a share of the axes
 
 def _estimates(result: Result, spec: ReportSpec, signal: str, unit: ShownUnit) -> dict[str, np.ndarray]:
     found = {observer: estimate(result, observer, signal) for observer in spec.observers}
-    return {observer: unit.values(bounded(values)) for observer, values in found.items() if values is not None}
+    return {observer: drawn(values, unit) for observer, values in found.items() if values is not None}
 
 
 def _scaled(result: Result, name: str | None, unit: ShownUnit) -> list[np.ndarray]:
     values = recorded(result, name)
-    return [] if values is None else [unit.values(bounded(values))]
+    return [] if values is None else [drawn(values, unit)]
 
 
 def _draw(
@@ -116,7 +115,7 @@ class SpeedPanel(_RunPanel):
     @classmethod
     def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
         names = [f"{name}.speed" for name in (*spec.observers, *spec.other_trains)]
-        unit = speed_unit(result, [spec.true_speed, spec.odometer, spec.speed_reference, *names])
+        unit = axis_unit(result, [spec.true_speed, spec.odometer, spec.speed_reference, *names], SPEED)
         true, odometer = _scaled(result, spec.true_speed, unit), _scaled(result, spec.odometer, unit)
         reference, estimates = _scaled(result, spec.speed_reference, unit), _estimates(result, spec, "speed", unit)
         others = {train: _scaled(result, f"{train}.speed", unit) for train in spec.other_trains}
@@ -133,30 +132,32 @@ class SpeedPanel(_RunPanel):
 
 
 class SlipPanel(_RunPanel):
-    """True and estimated slip in percent, and bars below them where the slip indicators were on, against time."""
+    """True and estimated slip, and bars below them where the slip indicators were on, against time."""
 
     name = "slip"
     title = "Slip"
-    caption = "True and estimated slip; bars where a slip indicator is on, in the legend's order. Locked wheel: -100 %."
+    caption = "True and estimated slip; bars where a slip indicator is on, in the legend's order. Locked wheel: -1."
     place = 4
     roles, estimates = ("true_slip",), ("slip", "slip_indicator")
     size = (8.2, 3.8)
 
     @classmethod
     def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
-        true = [slip_in_percent(values) for values in _scaled(result, spec.true_slip, _PLAIN)]
-        estimates = {o: slip_in_percent(values) for o, values in _estimates(result, spec, "slip", _PLAIN).items()}
+        unit = axis_unit(result, [spec.true_slip, *(f"{observer}.slip" for observer in spec.observers)], SLIP)
+        true, estimates = _scaled(result, spec.true_slip, unit), _estimates(result, spec, "slip", unit)
         settled = result.time >= spec.evaluate_after
         limits = value_limits([v[settled] for v in true], [v[settled] for v in estimates.values()])
         shade_zones(ax, spec)
         _draw(ax, result, true, limits, "true", TRUE_LINE)
         _draw_estimates(ax, result, spec, estimates, limits)
         _indicator_strips(ax, result, spec, limits)
-        ax.set_ylabel("Slip [%]")
+        ax.set_ylabel(f"Slip [{unit.name}]")
 
 
 class AdhesionPanel(_RunPanel):
-    """True and estimated adhesion force in kN, against time; the estimates' spikes may leave the axis."""
+    """True and estimated adhesion force in the unit in which they are shown, against time; the estimates' spikes may
+    leave the axis.
+    """
 
     name = "adhesion"
     title = "Adhesion force"
@@ -166,14 +167,16 @@ class AdhesionPanel(_RunPanel):
 
     @classmethod
     def plot(cls, result: Result, spec: ReportSpec, ax: Axes) -> None:  # noqa: D102 - see Panel
-        true = _scaled(result, spec.true_adhesion_force, _KN)
-        estimates = _estimates(result, spec, "adhesion_force", _KN)
+        names = [spec.true_adhesion_force, *(f"{observer}.adhesion_force" for observer in spec.observers)]
+        unit = axis_unit(result, names, FORCE)
+        true = _scaled(result, spec.true_adhesion_force, unit)
+        estimates = _estimates(result, spec, "adhesion_force", unit)
         limits = value_limits(true, list(estimates.values()))
         shade_zones(ax, spec)
         true_line = TRUE_LINE_ABOVE if any(map(_is_noisy, estimates.values())) else TRUE_LINE
         _draw(ax, result, true, limits, "true", true_line)
         _draw_estimates(ax, result, spec, estimates, limits)
-        ax.set_ylabel("Adhesion force [kN]")
+        ax.set_ylabel(f"Adhesion force [{unit.name}]")
         ax.ticklabel_format(axis="y", useOffset=False)  # a force that does not change has no scale of its own
 
 

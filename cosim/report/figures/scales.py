@@ -1,4 +1,4 @@
-"""Axis scales that one wild curve cannot squash. Imports NumPy only."""
+"""Axis scales that one wild curve cannot squash. NumPy and units only."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from cosim.results.shown_unit import ShownUnit
 
 _OFF_SCALE_RATIO = 100.0  # a curve this much larger than the next smaller one is left off the scale
 _LOG_RATIO = 8.0  # sizes that differ by more than this need a logarithmic axis
@@ -39,13 +41,13 @@ def bounded(values: np.ndarray) -> np.ndarray:
     return np.asarray(np.clip(values, -BOUND, BOUND))
 
 
-def slip_in_percent(values: np.ndarray) -> np.ndarray:
-    """Slip as it is drawn [%]: that of a locked wheel, which the ratio to the wheel's speed makes any size, is -100.
+def drawn(values: np.ndarray, unit: ShownUnit) -> np.ndarray:
+    """Values as they are drawn; the slip of a locked wheel, which the ratio to the wheel's speed makes any size, is -1.
 
     Args:
-        values: slip ratio [1], shape (rows,).
+        values: as they are kept, shape (rows,). unit: of the axis; one of pure numbers is that of a slip.
     """
-    return np.asarray(100.0 * np.clip(values, -1.0, 1.0))
+    return unit.values(np.clip(values, -1.0, 1.0) if unit.kept == "1" else bounded(values))
 
 
 def curve_size(values: np.ndarray) -> float:

@@ -13,9 +13,9 @@ from fmus.tables.table import Column, Table, error_column
 _BEFORE = "In the last row before each telegram that the observer used"
 _AFTER = "In the first row after each telegram that the observer used"
 COLUMNS = (
-    error_column("slip", "Slip error, rms", "%", factor=100.0),
-    error_column("adhesion_force", "Adhesion force error, rms", "kN", factor=1e-3),
-    error_column("coupler_force", "Coupler force error, rms", "kN", "Of the first coupler", factor=1e-3),
+    error_column("slip", "Slip error, rms", "1"),
+    error_column("adhesion_force", "Adhesion force error, rms", "N"),
+    error_column("coupler_force", "Coupler force error, rms", "N", "Of the first coupler"),
     error_column("speed_before", "Speed error before telegrams, rms", "m/s", _BEFORE),
     error_column("speed_after", "and after them", "m/s", _AFTER),
     error_column("position_before", "Position error before telegrams, rms", "m", _BEFORE),

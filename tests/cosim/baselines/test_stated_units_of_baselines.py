@@ -55,6 +55,23 @@ def test_a_baseline_keeps_what_was_stated(sealed: Path, tmp_path: Path, capsys: 
     assert "km/h too low" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("command", ["info", "linearise"])
+def test_a_look_at_an_fmu_alone_names_what_is_stated(
+    command: str, sealed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    declares = declaring(GERMAN, UNITS, tmp_path / "declares.fmu")
+    said = []
+    for file, lines in ((sealed, []), (sealed, LINES), (declares, [])):
+        assert main([command, str(file), *lines, "--json"]) == 0
+        data = json.loads(capsys.readouterr().out)
+        units = data["units"] if "units" in data else {v["name"]: v["unit"] for v in data["variables"]}
+        said.append([units[name] for name in ("vIst", "sIst")])
+    assert said == [[said[0][0]] * 2, ["km/h", "m"], ["km/h", "m"]]
+    assert said[0][0] in (None, "1")
+    assert main([command, str(sealed), "--unit", "vist=km/h"]) == 2
+    assert "'vIst'" in capsys.readouterr().err
+
+
 def _slower(sealed: Path, file: Path, folder: Path) -> Path:
     """A run of another mass, with units of its own."""
     recipe = read_baseline(file).header.recipe

@@ -230,6 +230,6 @@ def test_columns_without_numbers_are_left_out() -> None:
     assert not phases_table(phase_details(hand_made(), replace(SPEC, true_slip=None)), SPEC)
     table = phases_table(phase_details(synthetic_result(), synthetic_spec()), synthetic_spec())
     headings = [column.title() for column in table.columns]
-    assert "Slip error, rms [%]" in headings
+    assert "Slip error, rms [1]" in headings
     assert not any("Coupler force" in heading for heading in headings)
     assert [len(rows) for _, rows in groups(table)] == [3] * len(OBSERVERS)  # one group each, of three phases
