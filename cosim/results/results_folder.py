@@ -32,7 +32,7 @@ EVENTS, MESSAGES, SUMMARY = "events.csv", "messages.csv", "summary.json"
 PACKETS = "packets.csv"  # of runs with a network
 REPORT, FIGURES = "report.html", "figures"
 LAYOUT = 1  # version of the layout of summary.json
-Part = TypeVar("Part")
+_Part = TypeVar("_Part")
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def write_results(result: ResultData, directory: str | Path, formats: Sequence[s
     return {kind: folder / name for kind, name in names.items()}
 
 
-def _part(path: Path, read: Callable[[Path], Part]) -> Part:
+def _part(path: Path, read: Callable[[Path], _Part]) -> _Part:
     """What a file of the folder holds; what is wrong with it is said with its name, and the line that is no text."""
     try:
         return read(path)
