@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from test_fmus.build import compiled
@@ -36,6 +37,7 @@ def exchange_fmu(
     units: bool = False,
     lie: str = "",
     counts: bool = True,
+    arrays: bool = False,
 ) -> Path:
     """A model exchange FMU.
 
@@ -43,12 +45,14 @@ def exchange_fmu(
         folder: where it goes. model: a MODEL_... macro without the prefix. version: of FMI.
         saves: whether it declares that its state can be saved. units: whether its variables have units.
         lie: a LIE_... macro without the prefix. counts: whether the description has the count, which is discrete.
+        arrays: of FMI 3: whether its two states are one array, ``position``.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    library = compiled("exchange.c", f"#define VERSION {version}\n#define MODEL_{model}\n#define LIE_{lie}\n", "fmu")
-    platform = host_platform()
+    config = f"#define VERSION {version}\n#define MODEL_{model}\n#define LIE_{lie}\n"
+    library = compiled("exchange.c", config + ("#define ARRAYS\n" if arrays else ""), "fmu")
+    platform, text = host_platform(), _described(model, version, saves, units, counts)
     content = {
-        "modelDescription.xml": _described(model, version, saves, units, counts).encode(),
+        "modelDescription.xml": (_in_arrays(text) if arrays else text).encode(),
         f"binaries/{platform.fmi2_folder if version < 3 else platform.name}/{library_name('fmu')}": library,
     }
     return pack_fmu(content, folder / f"{model.lower()}{version}.fmu")
@@ -65,6 +69,16 @@ def _described(model: str, version: int, saves: bool, units: bool, counts: bool)
     for i in range(n):
         text = text.replace(f'<Unknown index="{n + 3 + i}"/>', f'<Unknown index="{n + 2 + i}"/>')
     return text
+
+
+def _in_arrays(text: str) -> str:
+    """The description of two states in FMI 3 with one array for both, and one for their derivatives."""
+    for dropped in ("<Float64 name=.speed.[^>]*/>", "<Float64 name=.der.speed.. [^>]*/>"):
+        text = re.sub(dropped, "", text)
+    for dropped in ('<Output valueReference="2"/>', '<ContinuousStateDerivative valueReference="5"/>'):
+        text = text.replace(dropped, "")
+    wide = r'\1><Dimension start="2"/></Float64>'
+    return re.sub(r'(<Float64 name="(?:position|der\(position\))"[^>]*)/>', wide, text)
 
 
 def _unit(index: int, units: bool) -> str:

@@ -13,6 +13,7 @@ from test_fmus.stepped import Stepped
 import fmus
 from cosim import Scenario
 from fmus.exchange import motion
+from fmus.exchange.model_calls import ModelCalls
 from plant_models.hybrid import HybridSystem, output_signal, parameter, state, vector
 
 ENDS = {"OSCILLATES": (400.0, 600.0, 2000.0), "REACTION": (0.4, 4e3, 4e7)}
@@ -118,3 +119,17 @@ def exchanged(path: Path) -> tuple[np.ndarray, dict[str, Any]]:
     assert outcome.failure is None
     values = np.array([outcome["rod.first"], outcome["rod.last"]])
     return values, outcome.result.summary["components"][0]["solver"]
+
+
+def test_an_array_of_states_has_the_jacobian_of_its_elements(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In C and in Python: the same steps as with a variable for each state."""
+    runs = []
+    for arrays, native in ((False, True), (True, True), (True, False)):
+        if not native:
+            monkeypatch.setattr(ModelCalls, "native", lambda *_: None)
+        fmu = Stepped(exchange_fmu(tmp_path / f"{arrays}", "REACTION", 3, arrays=arrays), 1e-6)
+        rows = [fmu.to(0.1 * k)[:2].tolist() for k in range(1, 21)]
+        runs.append((rows, fmu.component.slave.solved.summary()))
+        fmu.free()
+    assert runs[0][1]["jacobian"] == "directional derivatives"
+    assert runs[0] == runs[1] == runs[2]

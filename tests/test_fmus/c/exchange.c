@@ -172,8 +172,15 @@ static Model *make(void) {
     return m;
 }
 
+#if defined(ARRAYS) /* both states are one variable, and both derivatives */
+#define WIDTH(vr) ((vr) == 1 || (vr) == 4 ? 2u : 1u)
+#else
+#define WIDTH(vr) 1u
+#endif
+
 static int reals(Model *m, const unsigned *vr, size_t n, double *values) {
-    for (size_t i = 0; i < n; i++) values[i] = get(m, vr[i]);
+    for (size_t i = 0; i < n; i++)
+        for (unsigned k = 0; k < WIDTH(vr[i]); k++) *values++ = get(m, vr[i] + k);
     return 0;
 }
 
@@ -192,11 +199,16 @@ static int copy(double *to, const double *from, size_t n) {
 
 static int slopes(Model *m, const unsigned *rate, size_t n, const unsigned *state, size_t k, const double *seed, double *out) {
 #if defined(SLOPES)
-    for (size_t i = 0; i < n; i++) {
-        out[i] = 0.0;
-        for (size_t j = 0; j < k; j++) /* an output is a state, and nothing depends on the input */
-            out[i] += state[j] == 3 ? 0.0 : seed[j] * (rate[i] < 3 ? rate[i] == state[j] : slope(m, rate[i], state[j]));
-    }
+    for (size_t i = 0; i < n; i++)
+        for (unsigned at = 0; at < WIDTH(rate[i]); at++, out++) {
+            const double *along = seed;
+            *out = 0.0;
+            for (size_t j = 0; j < k; j++) /* an output is a state, and nothing depends on the input */
+                for (unsigned l = 0; l < WIDTH(state[j]); l++, along++) {
+                    unsigned row = rate[i] + at, column = state[j] + l;
+                    *out += column == 3 ? 0.0 : *along * (row < 3 ? row == column : slope(m, row, column));
+                }
+        }
     return 0;
 #else
     return 3;
