@@ -101,6 +101,7 @@ def _stands_out(change: np.ndarray, duration: np.ndarray) -> np.ndarray:
     slope = np.divide(change, duration, out=np.zeros_like(change), where=duration > 0.0)
     if len(slope) < NEIGHBOURS:
         return np.zeros(len(slope), dtype=bool)
-    padded, count = np.pad(slope, NEIGHBOURS), len(slope)
-    sides = [padded[NEIGHBOURS + k :][:count] for k in range(-NEIGHBOURS, NEIGHBOURS + 1) if k]
-    return np.asarray((duration > 0.0) & (change > _FAR_LARGER * np.maximum.reduce(sides) * duration))
+    padded, steepest = np.pad(slope, NEIGHBOURS), np.zeros(len(slope))
+    for k in (k for k in range(-NEIGHBOURS, NEIGHBOURS + 1) if k):
+        np.maximum(steepest, padded[NEIGHBOURS + k :][: len(slope)], out=steepest)
+    return np.asarray((duration > 0.0) & (change > _FAR_LARGER * steepest * duration))
