@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from cosim.expectations.evaluated import Evaluated
+from cosim.expectations.evaluated import Evaluated, with_margin
 from cosim.expectations.evaluated_run import EvaluatedRun, NotRecordedError
 from plant_models.explained_error import explained
 
@@ -39,4 +39,4 @@ def _evaluate(place: int, item: Any, run: EvaluatedRun) -> list[Evaluated]:
         parts = [Evaluated(item.check, item.check, passed=False, text=text)]
     if item.name is not None:
         parts = [replace(j, name=item.name if len(parts) == 1 else f"{item.name} ({j.name})") for j in parts]
-    return [replace(j, number=place) for j in parts]
+    return [with_margin(replace(j, number=place)) for j in parts]

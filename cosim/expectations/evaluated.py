@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
-from math import isfinite, nan
+from dataclasses import asdict, dataclass, fields, replace
+from math import inf, isfinite, isinf, isnan, nan
 from typing import Any
 
 from fmus.tables.numbers import number
 from fmus.tables.table import Table, name_column, text_column
+
+_LEAST = 1e-12
+"""A margin that is broken by rounding only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +27,8 @@ class Evaluated:
         when: when the worst was measured, or when what is not allowed began [s]; NaN where no instant says anything.
         text: one line: measured, limit, when, or why nothing was decided.
         number: which expectation of the scenario, from 1; one may be judged in several parts.
+        margin: how far from being broken, in parts of the limit: below 0 where it is not met; minus infinite where
+            something is no finite number, NaN where nothing was measured.
     """
 
     name: str
@@ -35,6 +40,7 @@ class Evaluated:
     when: float = nan
     text: str = ""
     number: int = 1
+    margin: float = nan
 
     def to_data(self) -> dict[str, Any]:
         """Plain data for the summary of a run."""
@@ -49,6 +55,19 @@ class Evaluated:
         """
         values: dict[str, Any] = {field.name: data[field.name] for field in fields(cls) if field.name in data}
         return cls(**(values | {key: nan for key, value in values.items() if value is None}))
+
+
+def with_margin(evaluated: Evaluated) -> Evaluated:
+    """With the margin that follows from what was measured and the limit, where the kind has stated none.
+
+    Args:
+        evaluated: of any kind.
+    """
+    measured, limit = evaluated.measured, evaluated.limit
+    if isnan(measured) or not isnan(evaluated.margin):
+        return evaluated
+    distance = inf if isinf(measured) or isinf(limit) else abs(measured - limit) / (abs(limit) or 1.0)
+    return replace(evaluated, margin=distance if evaluated.passed else -max(distance, _LEAST))
 
 
 _COLUMNS = (

@@ -20,6 +20,8 @@ LEVELS = {
 on.
 """
 ROUNDING = 1e-9
+TINY = 1e-12
+"""Parts of a window that count as none."""
 
 
 def shipped_threshold(signal: str) -> float | None:

@@ -4,7 +4,7 @@ only.
 
 from __future__ import annotations
 
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -100,8 +100,16 @@ def bounded(
     text += f"; {window.unreached}" if passed and window.broken else ""
     if last and window.broken:
         text, passed = f"{value} so far, expected {allowed}; {window.unreached}", False
+    scale = 0.5 * (high - low) if isfinite(high - low) else abs(limit)
     return Evaluated(
-        name, passed=passed and not window.broken, measured=measured, limit=limit, when=when, text=text, **base
+        name,
+        passed=passed and not window.broken,
+        measured=measured,
+        limit=limit,
+        when=when,
+        text=text,
+        margin=-float(excess[row]) / (scale or 1.0),
+        **base,
     )
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from cosim.expectations.evaluated import Evaluated, written
 from cosim.expectations.evaluated_run import EvaluatedRun, span
 from cosim.expectations.expectation import IndicatorExpectation
-from cosim.expectations.indicator_levels import ROUNDING, first_on, threshold_of
+from cosim.expectations.indicator_levels import ROUNDING, TINY, first_on, held, threshold_of
 
 if TYPE_CHECKING:
     from cosim.expectations.before import Before
@@ -48,8 +49,13 @@ class OnExpectation(IndicatorExpectation):
             first > self.before + ROUNDING * max(1.0, abs(self.before)) and window.reached < self.before
         ):
             text = window.unreached if window.reached < self.before else "never on"
+            _, shown = held(run.result.time, values, start, self.before)
+            level = float(np.nanmax(shown, initial=-np.inf))
+            common["margin"] = -1.0 - max(threshold - level, 0.0) / (abs(threshold) or 1.0)
             return [Evaluated(name, passed=False, text=f"{text} (threshold {written(threshold)})", **common)]
         passed = first <= self.before + ROUNDING * max(1.0, abs(self.before))
         already = " already, when the window begins" if first == start else ""
         text = f"on at {written(first, 's')}{already}, expected by {written(self.before, 's')}"
+        margin = (self.before - first) / max(self.before - start, TINY)
+        common["margin"] = max(margin, 0.0) if passed else margin
         return [Evaluated(name, passed=passed, measured=first, when=first, text=text, **common)]

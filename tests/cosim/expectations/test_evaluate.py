@@ -84,7 +84,8 @@ def test_sizes_of_errors(
     assert unmet.limit == limits[1]
     assert unmet.when == pytest.approx(when, nan_ok=True)
     assert f"allowed {limits[1]:g}" in unmet.text
-    assert not unmet.passed
+    assert unmet.margin == pytest.approx(1.0 - unmet.measured / limits[1], rel=1e-9)
+    assert unmet.margin < 0.0 <= met.margin
 
 
 SIGNALS = [
@@ -103,6 +104,7 @@ def test_bounds_of_signals(
     good, bad = (evaluated(hand_made(), {"check": "signal"} | item | bounds)[0] for bounds in (met, unmet))
     assert (good.passed, bad.passed) == (True, False)
     assert bad.measured == pytest.approx(measured)
+    assert bad.margin < 0.0 <= good.margin
     assert bad.when == when
     assert bad.unit in ("m/s", "m")
 
@@ -130,6 +132,33 @@ def test_indicators(item: dict[str, Any], passed: bool, measured: float) -> None
     (found,) = evaluated(hand_made(), item)
     assert found.passed is passed
     assert found.measured == pytest.approx(measured, nan_ok=True)
+    assert (found.margin >= 0.0) is passed
+
+
+MARGINS = [  # on from 6 s up to 8 s, in a run of 10 s
+    ({"check": "off", "threshold": 0.5}, -0.2),  # for 2 s of it
+    ({"check": "off", "threshold": 0.5, "from": 9.0}, 0.2),  # the last row on is that of 7 s, 2 s before
+    ({"check": "off", "threshold": 0.5, "to": 5.0}, 0.1),  # 1 s after it
+    ({"check": "off", "threshold": 4.0}, 1.75),  # never on, at most at 1
+    ({"check": "on", "threshold": 0.5, "before": 8.0}, 0.25),  # 2 s before
+    ({"check": "on", "threshold": 0.5, "from": 1.0, "before": 5.0}, -0.25),  # 1 s late, of 4 s
+    ({"check": "on", "threshold": 4.0, "before": 8.0}, -1.75),
+]
+
+
+@pytest.mark.parametrize(("item", "margin"), MARGINS)
+def test_an_indicator_is_nearer_to_being_wrong_the_nearer_it_is_in_time(item: dict[str, Any], margin: float) -> None:
+    (found,) = evaluated(hand_made(), item | {"signal": "observer.indicator"})
+    assert found.margin == pytest.approx(margin, rel=1e-12)
+
+
+def test_what_is_no_number_is_farthest_and_what_was_not_measured_is_nowhere() -> None:
+    (found,) = evaluated(
+        hand_made(changes={"observer.speed": np.full(12, math.nan)}), {"check": "speed_error", "max": 1}
+    )
+    assert found.margin == -math.inf
+    (found,) = evaluated(hand_made(), {"check": "speed_error", "max": 1, "from": 9.0})
+    assert math.isnan(found.margin)
 
 
 TELEGRAMS = [
