@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from cosim.comparison.comparison import Comparison
     from cosim.comparison.tolerance import Tolerance, Tolerances
     from cosim.errors import CosimError, UnmetError
+    from cosim.falsification.falsify import falsify
     from cosim.provenance.rerun import rerun
     from cosim.results.load_result import load_result
     from cosim.results.result import Result
@@ -43,6 +44,7 @@ __all__ = [
     "UnmetError",
     "benchmark_observers",
     "compare",
+    "falsify",
     "load_result",
     "log_uniform",
     "rerun",
@@ -69,6 +71,7 @@ __getattr__, __dir__ = lazy_imports(
         "UnmetError": "cosim.errors",
         "benchmark_observers": "cosim.choice.benchmark",
         "compare": "cosim.comparison.compare",
+        "falsify": "cosim.falsification.falsify",
         "load_result": "cosim.results.load_result",
         "log_uniform": "cosim.studies.distributions",
         "rerun": "cosim.provenance",

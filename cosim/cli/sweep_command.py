@@ -111,7 +111,7 @@ def _sweep(scenario: Scenario, options: argparse.Namespace) -> Sweep:
     if options.zip and options.samples is not None:
         raise ScenarioError("--zip and --samples exclude each other.")
     mode: Any = "latin" if options.samples is not None else "zip" if options.zip else "grid"
-    values = (_cases(scenario, options.settings, options.zip) if options.cases else {}) | _values(options.vary)
+    values = (_cases(scenario, options.settings, options.zip) if options.cases else {}) | varied_values(options.vary)
     if not values:
         raise ScenarioError("Nothing is varied: give --vary NAME=VALUES, or --cases for a scenario with cases.")
     if options.cases and not scenario.cases:
@@ -135,8 +135,11 @@ def _cases(scenario: Scenario, settings: list[str], zipped: bool) -> dict[str, l
     }
 
 
-def _values(stated: list[str]) -> dict[str, Any]:
+def varied_values(stated: list[str]) -> dict[str, Any]:
     """Names and values of all ``--vary``.
+
+    Args:
+        stated: words behind each.
 
     Raises:
         ScenarioError: one is not ``NAME=VALUES``, or a name is given twice.

@@ -41,7 +41,7 @@ def variations(
     if not values:
         raise ScenarioError("vary: nothing is varied; expected for instance {'plant.mass': [70e3, 80e3]}.")
     if mode not in ("grid", "zip"):
-        return _sampled({name: _drawn_from(name, stated) for name, stated in values.items()}, mode, count, seed)
+        return _sampled({name: drawn_from(name, stated) for name, stated in values.items()}, mode, count, seed)
     if count is not None:
         raise ScenarioError(f"vary: 'count' belongs to mode 'latin', 'random' or 'sobol', not to {mode!r}.")
     lists = {name: _entries(name, stated) for name, stated in values.items()}
@@ -71,8 +71,12 @@ def _listed(values: Any) -> list[Variation]:
     return [plain(row) for row in rows]
 
 
-def _drawn_from(name: str, stated: Any) -> Distribution:
-    """What the values of one name are drawn from."""
+def drawn_from(name: str, stated: Any) -> Distribution:
+    """What the values of one name are drawn from.
+
+    Args:
+        name: for messages. stated: a distribution, or a list of which each entry is as likely.
+    """
     return stated if hasattr(stated, "at") else Entries(_entries(name, stated))
 
 

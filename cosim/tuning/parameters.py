@@ -81,7 +81,7 @@ def tunable(scenario: Scenario, component: str | None, bounds: Mapping[str, Boun
         name = stated if component is None or _head(stated) in _scenario_names(scenario) else f"{component}.{stated}"
         parameters.append(_bounded(name, limits))
         match = ENTRY.fullmatch(name)
-        found = _present(scenario, match[1] if match else name, stated)
+        found = present_value(scenario, match[1] if match else name, stated)
         if match is None:
             if isinstance(found, list):
                 raise ScenarioError(f"{stated}: this is a vector with {len(found)} elements; tune {stated}[1], ...")
@@ -146,8 +146,11 @@ def _without_others(vectors: dict[str, Any], whole: str) -> str:
     return f"{whole}: entries off the diagonal are zero in all candidates; they were not." if others else ""
 
 
-def _present(scenario: Scenario, name: str, stated: str) -> Any:
-    """Present value of a setting: a number, or a list of a vector.
+def present_value(scenario: Scenario, name: str, stated: str) -> Any:
+    """Present value of a setting: a number, or a list of a vector; NaN where the scenario does not say.
+
+    Args:
+        scenario: that has it. name: as for `Scenario.set`. stated: name for messages.
 
     Raises:
         ScenarioError: there is no such setting, or it is no number.

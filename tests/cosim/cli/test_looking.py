@@ -43,7 +43,7 @@ LOOKING = {
 """Lines of all commands that look, by program and name; words in capitals are files of those below."""
 RUNNING = {
     *(f"cosim {name}" for name in ("baseline", "calibrate", "choose", "linearise", "new", "rerun", "run", "sweep")),
-    *("cosim tune", "fmus build", "fmus check", "fmus compile"),
+    *("cosim falsify", "cosim tune", "fmus build", "fmus check", "fmus compile"),
 }
 FROM_FOLDERS = (
     "run FOLDER --out OUT --no-report --quiet",

@@ -47,6 +47,7 @@ LINES = {
         "export of a result": "export RESULTS OUT.npy",
         "export of a scenario": "export TRAIN OUT.ssp",
         "export of a trajectory": "export RESULTS OUT.csv --trajectory --odometer odometer.reading",
+        "falsify": "falsify MET.toml --vary locomotive.mass=70e3..80e3 --runs 2 --quiet --out OUT",
         "info of a model": "info locomotive",
         "info of an FMU": "info LAG.fmu",
         "linearise": "linearise takagi_sugeno_cdo",
@@ -66,6 +67,7 @@ LINES = {
         "compare of one with itself": "compare RESULTS RESULTS",
         "rerun of something else": "rerun RESULTS --quiet --set locomotive.mass=81e3",
         "run of what is not met": "run UNMET.toml --quiet --out OUT --no-report",
+        "falsify what breaks": "falsify MET.toml --vary locomotive.train_speed=70..80 --runs 2 --quiet --out OUT",
         "sweep that fails": "sweep TRAIN --vary locomotive.mass=70e3,-1 --quiet --out OUT",
         "sweep by": "sweep TRAIN --vary locomotive.mass=70e3,80e3 --by locomotive.mass --quiet --out OUT",
     },
@@ -99,6 +101,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     scenario.save(folder / "TRAIN.toml")
     unmet = {"check": "signal", "signal": "locomotive.speed", "max": 0.001}
     scenario.copy().set("expect", [unmet]).save(folder / "UNMET.toml")
+    scenario.copy().set("expect", [unmet | {"max": 40.0}]).save(folder / "MET.toml")
     scenario.set("locomotive.mass", 80e3).save(folder / "heavy.toml")
     lag = linear_fmu(folder, "LAG", [[-1.0]], [[1.0]], [[1.0]], [[0.0]], version=2, x0=[1.0])
     with zipfile.ZipFile(shutil.copy(lag, folder / "BROKEN.fmu"), "a") as archive:

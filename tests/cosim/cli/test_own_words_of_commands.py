@@ -25,6 +25,7 @@ STEPPING = {
     "rerun": "rerun RESULTS --set boiler.from_when=0.29",
     "sweep": "sweep BAD --vary step=0.1,0.05 --out OUT",
     "tune": "tune BAD --parameters boiler.gain=0.5:2 --cost rms(boiler.y) --iterations 1 --out OUT",
+    "falsify": 'falsify BAD --vary boiler.gain=0.5..2 --set expect=[{{check="warnings"}}] --out OUT',
     "calibrate": "calibrate BAD RESULTS --parameters boiler.gain=1.5",
     "choose": "choose TRAIN --observers {file}:PlainSpeed",
     "baseline make": "baseline make BAD OUT",

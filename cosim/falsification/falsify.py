@@ -1,0 +1,199 @@
+"""Falsification of a scenario: runs of a search, on the one engine of runs, until one breaks an expectation; then it is
+made small. Touches the folder that it is given.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import ScenarioError
+from cosim.falsification.margins import Margin, expectations_of, margin_of
+from cosim.falsification.search import RestartedSearch
+from cosim.falsification.smallest import fewest, nearest
+from cosim.falsification.weakness import Falsification
+from cosim.runs.engine import run_jobs
+from cosim.runs.executors import Executor, make_executor
+from cosim.runs.journal import Journal
+from cosim.runs.keys import code_content
+from cosim.runs.run import Run
+from cosim.simulation.scenario import Scenario
+from cosim.studies.distributions import Distribution
+from cosim.studies.sampling_plans import drawn_from
+from cosim.studies.sweep import make_sweep
+from cosim.tuning.parameters import present_value
+from fmus.cli.progress import Progress, Report, reported
+
+
+def falsify(
+    scenario: Scenario,
+    values: Mapping[str, Iterable[Any] | Distribution],
+    *,
+    expectation: int | None = None,
+    runs: int = 200,
+    worst: bool = False,
+    seed: int = 0,
+    directory: str | Path | None = None,
+    workers: int = 1,
+    scheduler: str | None = None,
+    resume: bool = False,
+    retry: bool = False,
+    progress: Progress = None,
+) -> Falsification:
+    """Search for a run that breaks an expectation, and make it as small as it can be.
+
+    The cost is the smallest `margin` of the expectations. The search is that of `RestartedSearch`, over the shares of
+    the distributions. Of what breaks an expectation, changes are left out as long as the same expectation stays broken,
+    and numbers brought towards what the scenario has.
+
+    Args:
+        scenario: with expectations, all of them met as it is. values: names as for `Scenario.set`, each with a range or
+            the values it takes.
+        expectation: its number in the scenario, from 1; None for whichever is broken first.
+        runs: of the search at most. worst: whether it goes on to the last of them, to what is broken most.
+        seed: of the search. directory: of the journal; None for none. workers, scheduler: see `make_executor`.
+        resume, retry: see `Journal`. progress: called with the number done and the number in all.
+
+    Returns:
+        What was found; nothing has been written but the journal.
+
+    Raises:
+        ScenarioError: there is nothing to break, or a name or a value cannot be; the scenario as it is breaks it, or
+            cannot be run.
+    """
+    if not values:
+        raise ScenarioError("Nothing is varied: name settings with ranges, such as {'balises.spacing': (200, 900)}.")
+    _demand_expectation(scenario, expectation)
+    make_sweep(scenario, values, "latin", 1, seed)  # names and values can be
+    drawn = {name: drawn_from(name, stated) for name, stated in values.items()}
+    if resume and directory is None:
+        raise ScenarioError("A search is resumed from its folder: give directory=...")
+    journal = None if directory is None else Journal(Path(directory), resume=resume, retry=retry)
+    apart = Run(scenario, {name: one.at(0.5) for name, one in drawn.items()}).apart
+    with make_executor(workers, scheduler, apart=apart) as executor, reported(progress, "run") as report:
+        return _falsified(_Margins(scenario, executor, journal, expectation, runs, report), drawn, seed, worst)
+
+
+@dataclass
+class _Margins:
+    """Margins of settings, by runs.
+
+    Args:
+        scenario: that is run. executor: where. journal: of the runs, or None. which: expectation, or None for all.
+        most: runs of the search. report: of progress, or None. done: runs of the search so far. shrinking: others.
+        failures: how many runs ended early, by reason.
+    """
+
+    scenario: Scenario
+    executor: Executor
+    journal: Journal | None
+    which: int | None
+    most: int
+    report: Report | None
+    done: int = 0
+    shrinking: int = 0
+    failures: Counter[str] = field(default_factory=Counter)
+
+    def of(self, settings: Sequence[Mapping[str, Any]], *, searching: bool) -> list[Margin]:
+        """The margin with each of some settings, in their order; infinite of a run that ended early."""
+        rests_on = code_content(expectations_of)
+        jobs = [Run(self.scenario, each, expectations_of, rests_on) for each in settings]
+        found = [Margin()] * len(jobs)
+        for done in run_jobs(jobs, self.executor, self.journal):
+            found[done.number] = margin_of(done.row, self.which)
+            self.failures.update([] if done.failure is None else [done.failure.reason])
+            self.done += searching
+            self.shrinking += not searching
+            if self.report is not None:
+                self.report(min(self.done, self.most), self.most)
+        return found
+
+    def broken(self, settings: Sequence[Mapping[str, Any]]) -> list[bool]:
+        """Whether the expectation is broken with each of some settings."""
+        return [margin.broken for margin in self.of(settings, searching=False)]
+
+
+def _falsified(margins: _Margins, drawn: Mapping[str, Distribution], seed: int, worst: bool) -> Falsification:
+    as_it_is = margins.of([{}], searching=False)[0]
+    _demand_met(as_it_is, margins)
+    margins.shrinking = 0
+    found, best, first = _search(margins, drawn, seed, worst)
+    nominal = {name: value for name in drawn if isfinite(value := _present(margins.scenario, name))}
+    smallest: dict[str, Any] = {}
+    margin = best
+    if best.broken and best.evaluated is not None:
+        margins.which = best.evaluated.number  # the same one stays broken
+        smallest = nearest(fewest(found, margins.broken), nominal, margins.broken)
+        margin = margins.of([smallest], searching=False)[0]
+    return Falsification(
+        scenario=margins.scenario,
+        nominal=nominal,
+        as_it_is=as_it_is,
+        worst=best,
+        found=found,
+        smallest=smallest,
+        margin=margin,
+        searched=margins.done,
+        first=first,
+        shrunk=margins.shrinking,
+        failures=margins.failures,
+    )
+
+
+def _search(
+    margins: _Margins, drawn: Mapping[str, Distribution], seed: int, worst: bool
+) -> tuple[dict[str, Any], Margin, int | None]:
+    """Settings of the run that is nearest to breaking an expectation or breaks it most, its margin, and the number of
+    the first that breaks one, from 1.
+    """
+    search = RestartedSearch(len(drawn), seed)
+    best, found, first = Margin(), {name: one.at(0.5) for name, one in drawn.items()}, None
+    while margins.done < margins.most and (worst or first is None):
+        points = search.ask()
+        before = margins.done
+        settings = [{name: one.at(float(u)) for (name, one), u in zip(drawn.items(), p, strict=True)} for p in points]
+        values = margins.of(settings[: margins.most - before], searching=True)
+        for number, (margin, each) in enumerate(zip(values, settings, strict=False), start=before + 1):
+            first = number if first is None and margin.broken else first
+            if margin.value < best.value:
+                best, found = margin, each
+        if len(values) < len(points):
+            break
+        search.tell(points, np.array([margin.value for margin in values]))
+    return found, best, first
+
+
+def _demand_expectation(scenario: Scenario, which: int | None) -> None:
+    count = len(scenario.table().expect)
+    if not count:
+        raise ScenarioError(f"{scenario.where} expects nothing that could be broken; give it a table [[expect]].")
+    if which is not None and not 1 <= which <= count:
+        raise ScenarioError(f"There is no expectation {which}; {scenario.where} has {count}, the first is 1.")
+
+
+def _demand_met(as_it_is: Margin, margins: _Margins) -> None:
+    """The scenario runs and breaks nothing as it is."""
+    if as_it_is.value == inf:
+        why = next(iter(margins.failures), "no expectation was judged")
+        raise ScenarioError(f"{margins.scenario.where} cannot be searched, its run shows no expectation: {why}")
+    if as_it_is.broken and as_it_is.evaluated is not None:
+        shown = as_it_is.evaluated
+        raise ScenarioError(
+            f"{margins.scenario.where} breaks expectation {shown.number} as it is, without any change: {shown.name}: "
+            f"{shown.text}. Search from a scenario that meets it, or name another one (--expectation N)."
+        )
+
+
+def _present(scenario: Scenario, name: str) -> float:
+    """What the scenario has; NaN where it is no number."""
+    try:
+        value = present_value(scenario, name, name)
+    except ScenarioError:
+        value = getattr(scenario.table(), name, None)
+    return float(value) if isinstance(value, int | float) else float("nan")
