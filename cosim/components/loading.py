@@ -24,7 +24,6 @@ from cosim.components.fmi3 import FMI3Component
 from cosim.components.stated_units import NONE_STATED, StatedUnit, state_units
 from cosim.components.unpacking import unpack
 from cosim.errors import CouplingError, FmuLoadError, ScenarioError
-from cosim.process.crashes import note_crash
 from cosim.process.exit_guard import guard_exit
 from cosim.process.last_call import LAST_CALL
 from fmu_observer.description import describe
@@ -38,6 +37,7 @@ from fmus.fmi.fmi2 import FMI2Slave
 from fmus.fmi.library import load
 from fmus.fmi.standard import CO_SIMULATION, Interface, Method, fmi_version
 from fmus.fmi.surroundings import Surroundings
+from fmus.isolation.crashes import note_crash
 from fmus.isolation.library import load_isolated
 from fmus.isolation.limits import OwnProcess
 from plant_models.disk_cache.files import file_digest

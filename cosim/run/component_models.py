@@ -19,13 +19,13 @@ from cosim.components.python_model import PythonModel
 from cosim.components.recording import RecordingComponent, load_recording
 from cosim.components.recording_data import Recording
 from cosim.errors import ScenarioError, nearest
-from cosim.process.crashes import noted_crash
 from cosim.run.backends import FAULTS, Notify, Realised, Request, cannot_build, realise
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.paths import absolute, move_option_files
 from cosim.scenario.scenario_tables import Backend, ComponentTable, Isolate
 from fmu_observer.event_protocol import EventProtocol
 from fmu_observer.observers.parameter_values import parameter_values
+from fmus.isolation.crashes import noted_crash
 from fmus.isolation.limits import OwnProcess
 from fmus.isolation.programs import IsolationUnavailable, isolation_programs
 from plant_models.disk_cache.files import file_digest

@@ -27,6 +27,7 @@ from fmus.check.findings import CheckFinding, Verdict
 from fmus.check.job import CheckJob
 from fmus.check.known_checks import CHECKS
 from fmus.check.worker import FILES_CLOSED, unrun
+from fmus.isolation.crashes import note_crash
 from plant_models.left_behind import owned
 
 _START_LIMIT = 60.0
@@ -45,6 +46,8 @@ _END_ADVICE = (
     "give each run a process of its own: cosim run writes its results before it ends the FMU, and waits for that as "
     "long as master.call_timeout says"
 )
+_WATCHDOG_ENDED = "ended, and its watchdog with it,"
+_FROM_OUTSIDE = (_WATCHDOG_ENDED, "crashed with signal 9 ", "crashed with signal 15 ")
 LEFT = "processes"
 _CONSOLE = "console output"
 SHOWN = 80
@@ -70,6 +73,11 @@ class _Child:
     left: int = 0
     ending: str = ""
     only_once: bool = False
+
+    @property
+    def blamed(self) -> bool:
+        """Whether it was ended by the FMU, and perhaps not by somebody else."""
+        return self.crashed and not self.end.startswith(_FROM_OUTSIDE)
 
     @property
     def where(self) -> str:
@@ -98,6 +106,8 @@ def run_isolated(job: CheckJob, progress: Callable[[str], None] = lambda _: None
             if not left:
                 break
             lost = child.current or left[0]
+            if child.blamed:
+                note_crash(job.digest, f"{child.where} in the check '{lost}'")
             if child.ending and job.ends and not child.only_once:
                 found = [*_others(found), CheckFinding(END, Verdict.LIMIT, child.where, _END_ADVICE)]
                 left, job = tuple(name for name in left if name != END), replace(job, ends=False)
@@ -212,7 +222,7 @@ def _ending(message: dict[str, Any]) -> str:
     if "stopped" in message:
         return str(message["stopped"])
     if "ended" not in message:
-        return "ended, and its watchdog with it,"
+        return _WATCHDOG_ENDED
     code = int(message["ended"])
     if code < 0:
         try:

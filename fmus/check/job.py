@@ -18,7 +18,7 @@ class CheckJob:
         step: communication step [s]. start_time: [s]. starts: start values by name.
         budget: time that one check may take [s]. steps: of the longest run.
         places: of checks that the program has registered, ``file.py:Class`` by name.
-        ends: whether instances are terminated and freed.
+        ends: whether instances are terminated and freed. digest: of the content of the FMU's file.
     """
 
     folder: str
@@ -31,6 +31,7 @@ class CheckJob:
     starts: Mapping[str, float] = field(default_factory=dict)
     places: Mapping[str, str] = field(default_factory=dict)
     ends: bool = True
+    digest: str = ""
 
     def to_json(self) -> str:
         """As one line of text."""

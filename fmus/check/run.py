@@ -24,6 +24,7 @@ from fmus.fmi.archive import Archive, NotAnFmuError, open_archive
 from fmus.fmi.instance import INSTANTIATING
 from fmus.fmi.standard import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION
 from fmus.fmi.types import NUMERIC_TYPES, why_not_set
+from plant_models.disk_cache.files import file_digest
 from plant_models.registry import log_left_out
 from plant_models.user_file import UserFileError, name_of
 
@@ -159,6 +160,7 @@ def _run_findings(archive: Archive, job: CheckJob, progress: Callable[[str], Non
     """
     findings: list[CheckFinding] = []
     left_out: dict[str, str] = {}
+    job = replace(job, digest=file_digest(archive.path))
     with archive.unpacked() as folder:
         for interface in _looked_at(archive):
             if interface == SCHEDULED_EXECUTION:

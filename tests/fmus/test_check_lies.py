@@ -12,6 +12,8 @@ from fmus.check import CheckReport, Class, Verdict, check_fmu
 from fmus.check.checked_instance import make_slave
 from fmus.check.runner import Runner
 from fmus.fmi.archive import open_archive
+from fmus.isolation.crashes import noted_crash
+from plant_models.disk_cache.files import file_digest
 
 PASS, NOTE, LIMIT, DISTRUST, SKIPPED = Verdict.PASS, Verdict.NOTE, Verdict.LIMIT, Verdict.DISTRUST, Verdict.SKIPPED
 
@@ -222,6 +224,19 @@ def test_the_end_is_named_and_all_else_is_checked(lie: str, words: str, tmp_path
     assert (report.verdict, report.finding("terminate and free").verdict) == (Class.LIMITS, LIMIT)
     assert "Run it in a process of its own: it died or hung in terminate and free." in report.trust
     assert report.finding("state in another instance").verdict is PASS
+
+
+@pytest.mark.parametrize(
+    ("lie", "known"), [("CRASH_IN_STEP", "(SIGSEGV) in the check 'stepping'"), ("HANG_TERMINATED", "")]
+)
+def test_a_file_that_crashed_is_remembered_by_its_content(
+    lie: str, known: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FMU_OBSERVER_CACHE", str(tmp_path / "cache"))
+    report = checked(tmp_path, lie, timeout=3.0)
+    said = noted_crash(file_digest(report.archive.path))
+    assert known in said
+    assert bool(said) == bool(known)  # one that was silent may be slow
 
 
 def test_an_end_where_no_second_instance_is_allowed_is_named_too(tmp_path: Path) -> None:

@@ -12,9 +12,9 @@ import pytest
 from test_fmus.events import DEEDS, hostile_fmu
 
 from cosim import Scenario
-from cosim.process import crashes
 from cosim.runs.run import Run
 from cosim.runs.workers import Team
+from fmus.isolation import crashes
 from plant_models.disk_cache.files import file_digest
 
 pytestmark = [pytest.mark.compiler, pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="Linux")]
