@@ -75,11 +75,6 @@ class _Child:
     only_once: bool = False
 
     @property
-    def blamed(self) -> bool:
-        """Whether it was ended by the FMU, and perhaps not by somebody else."""
-        return self.crashed and not self.end.startswith(_FROM_OUTSIDE)
-
-    @property
     def where(self) -> str:
         """How it ended and in which call, where that is known."""
         return f"{self.end} in {self.ending}" if self.ending else self.end
@@ -106,8 +101,7 @@ def run_isolated(job: CheckJob, progress: Callable[[str], None] = lambda _: None
             if not left:
                 break
             lost = child.current or left[0]
-            if child.blamed:
-                note_crash(job.digest, f"{child.where} in the check '{lost}'")
+            _remember(job, child, lost)
             if child.ending and job.ends and not child.only_once:
                 found = [*_others(found), CheckFinding(END, Verdict.LIMIT, child.where, _END_ADVICE)]
                 left, job = tuple(name for name in left if name != END), replace(job, ends=False)
@@ -121,6 +115,12 @@ def run_isolated(job: CheckJob, progress: Callable[[str], None] = lambda _: None
         found += [_left(running), _console(console)]
     order = {name: place for place, name in enumerate(job.checks)}
     return sorted(found, key=lambda f: order.get(f.check, len(order)))
+
+
+def _remember(job: CheckJob, child: _Child, lost: str) -> None:
+    """The FMU is remembered as one that ended a process, where that was not perhaps somebody else."""
+    if child.crashed and not child.end.startswith(_FROM_OUTSIDE):
+        note_crash(job.digest, f"{child.where} in the check '{lost}'")
 
 
 def _others(findings: list[CheckFinding]) -> list[CheckFinding]:
