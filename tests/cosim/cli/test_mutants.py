@@ -124,6 +124,7 @@ OWNERS = {
     "scenario.toml": "the run ended early: ",
     "ride.csv": r"replay\.toml: .*\bride\b",
     "baseline.csv": r"baseline\.json",
+    "baseline.json": r"baseline\.csv",
     "manifest.json": "results/",
 }
 """By a damaged file what else may be named as the place: the file that names it, with the part that is read from it."""
