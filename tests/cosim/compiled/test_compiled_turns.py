@@ -147,6 +147,20 @@ def test_who_meets_an_event_takes_the_others_back(step: float, tmp_path: Path) -
     assert python.result.summary["master"]["events"] == compiled.result.summary["master"]["events"]
 
 
+@pytest.mark.parametrize("every", [1, 4])
+def test_what_others_change_is_told_where_it_changes(every: int, tmp_path: Path) -> None:
+    """A discrete input behind a component without events of its own, which moves in each step or every fourth."""
+    made = Scenario(folder=tmp_path, stop=1.2, step=0.05)
+    grows = linear_fmu(tmp_path, "z", [[1.0]], [[1.0]], [[1.0]], [[0.0]], version=2, x0=[1.0])
+    made.add("z", fmu=str(grows), every=every).add("i", fmu=str(integrator_fmu(tmp_path)))
+    made.connect("z.y1 -> i.u")
+    python, compiled = both(made)
+    assert_equal(python, compiled)
+    assert python.result.summary["master"]["events"]["instants"] >= 24 // every
+    assert python.result.summary["master"]["events"] == compiled.result.summary["master"]["events"]
+    assert share(compiled) > 0.9
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in shipped_scenarios() if name != "own_fmu"])
 def test_shipped_scenarios_are_stepped_in_c(name: str) -> None:
