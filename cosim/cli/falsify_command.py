@@ -57,7 +57,7 @@ ARGUMENTS = (
 
 
 def execute(options: argparse.Namespace) -> Output:
-    """What the search found, as it is written in the folder.
+    """What the search that the options ask for has found, as it is written in the folder.
 
     Raises:
         CosimError: there is nothing to search, or the scenario breaks an expectation as it is.

@@ -10,6 +10,7 @@ import numpy as np
 
 from cosim.studies.distributions import unit_points
 from fmu_observer.design.optimisers.methods.cma_es import CovarianceMatrixAdaptation
+from plant_models.missing_package import optional_package
 
 _JUST_BELOW = np.nextafter(1.0, 0.0)  # distributions end before a share of 1
 _STEP = 0.25  # first deviation, of the range
@@ -27,9 +28,13 @@ class RestartedSearch:
     Args:
         dimension: of the cube. seed: of all that is left to chance. spread: points of a start; None for four
             populations.
+
+    Raises:
+        ImportError: the package cma is not installed.
     """
 
     def __init__(self, dimension: int, seed: int, spread: int | None = None) -> None:
+        optional_package("cma", "A search for what breaks an expectation")  # said at once
         self._dimension, self._seed, self._starts = dimension, seed, 0
         self.population = 4 + int(3.0 * log(dimension))
         self._spread = spread or 4 * self.population
