@@ -19,12 +19,15 @@ from pathlib import Path
 import numpy as np
 from cpu_time import seconds
 
+from cosim import Scenario
 from cosim.balises.layout import from_csv
 from cosim.balises.telegram import Mailbox
 from cosim.baselines.baseline_files import read_baseline, write_baseline
 from cosim.baselines.regression import check
 from cosim.comparison.compare import compare_results
 from cosim.errors import ScenarioError
+from cosim.evaluation.stored_spec import spec_of
+from cosim.report.page.run_page import write_report_page
 from cosim.results.load_result import load_result
 from cosim.results.record_rows import PACKET_ROWS, TELEGRAM_ROWS
 from cosim.results.result import BaliseRecord, PacketRecord, Result, SignalInfo
@@ -152,6 +155,58 @@ def signals_of_npy(count: int, folder: Path) -> Measured:
     return _columns(count, folder, "npy")
 
 
+def signals_of_hdf5(count: int, folder: Path) -> Measured:
+    return _columns(count, folder, "h5")
+
+
+def signals_of_parquet(count: int, folder: Path) -> Measured:
+    return _columns(count, folder, "parquet")
+
+
+def rows_of_hdf5(count: int, folder: Path) -> Measured:
+    result(count).save(folder / "long.h5")
+    return lambda: load_result(folder / "long.h5")
+
+
+def rows_of_parquet(count: int, folder: Path) -> Measured:
+    result(count).save(folder / "long.parquet")
+    return lambda: load_result(folder / "long.parquet")
+
+
+def _page(shown: Result, folder: Path) -> Measured:
+    return lambda: write_report_page(shown, spec_of(shown), folder / "page.html")
+
+
+def page_of_rows(count: int, folder: Path) -> Measured:
+    return _page(result(count), folder)
+
+
+def page_of_signals_by_ten(count: int, folder: Path) -> Measured:
+    return _page(result(FEW, count // 10), folder)
+
+
+def page_of_telegrams(count: int, folder: Path) -> Measured:
+    return _page(replace(result(FEW), events=_telegrams(count)), folder)
+
+
+def _chain(count: int) -> Scenario:
+    """Odometers, each of which measures what the one before has read, one step long."""
+    chained = Scenario(stop=0.01, step=0.01)
+    for number in range(count):
+        chained.add(f"o{number}", model="odometer", parameters={} if number else {"wheel_speed": 0.0})
+    links = [f"o{number}.reading -> o{number + 1}.wheel_speed" for number in range(count - 1)]
+    return chained.connect(*links)
+
+
+def components_by_hundred_run(count: int, _folder: Path) -> Measured:
+    chained = _chain(count // 100)
+    return lambda: chained.run(warn=lambda _: None, progress=False)
+
+
+def components_by_hundred_stated(count: int, _folder: Path) -> Measured:
+    return lambda: _chain(count // 100)
+
+
 def rows_of_mat(count: int, folder: Path) -> Measured:
     file = folder / "long.mat"
     result(count).save(file)
@@ -211,7 +266,8 @@ CASES = (
     (compare_rows, compare_held_rows, compare_signals, compare_telegrams, compare_telegrams_of_few_balises),
     (compare_packets, layout, layout_with_one_twice, mailbox, telegram_rows, packet_rows, write_folder, read_folder),
     (signals_of_csv, signals_of_mat, signals_of_npy, rows_of_mat, baseline_made, baseline_checked, baseline_signals),
-    (journal, table_as_text, table_as_page),
+    (journal, table_as_text, table_as_page, signals_of_hdf5, signals_of_parquet, rows_of_hdf5, rows_of_parquet),
+    (page_of_rows, page_of_signals_by_ten, page_of_telegrams, components_by_hundred_stated, components_by_hundred_run),
 )
 
 
