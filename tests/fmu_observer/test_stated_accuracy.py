@@ -19,14 +19,14 @@ from test_kalman_filters import Vehicle
 from fmu_observer import OBSERVERS
 from fmu_observer.observers.gated_observer import GatedObserver
 from fmu_observer.observers.innovation_gate import OFF, place_deviation
-from fmu_observer.observers.train import BaliseMovingHorizon, EtcsOdometry
+from fmu_observer.observers.train import BaliseMovingHorizon, EtcsOdometry, IntervalOdometry
 from fmu_observer.observers.train.adaptive_wheel_radius import PRIOR
 
 ROBUST = BaliseMovingHorizon.name
 """A loss that doubts outliers doubts those the more that tell an accuracy which they do not keep."""
-BY_RULE = EtcsOdometry.name
-"""A group is the reference by rule, SUBSET-026, 3.6.4.2; its accuracy widens the interval: `test_etcs_odometry`."""
-LAWFUL = {n: m for n, m in MAKERS.items() if n not in (ROBUST, BY_RULE)} | {
+INTERVALS = (EtcsOdometry.name, IntervalOdometry.name)
+"""An accuracy is a width to them: `test_etcs_odometry`, `test_interval_odometry`."""
+LAWFUL = {n: m for n, m in MAKERS.items() if n not in (ROBUST, *INTERVALS)} | {
     f"{ROBUST} with squares": cache(partial(BaliseMovingHorizon, loss="squares"))
 }
 OFFSET, REPORTED = 5.0, (0.0, 1.0, 5.0, 20.0, 63.0)
