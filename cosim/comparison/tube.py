@@ -134,7 +134,7 @@ def _held_rows(
     evaluated = np.stack([begin.evaluated, middle.evaluated & holds, end.evaluated & holds])
     low = np.max(np.where(evaluated, [begin.low, middle.low, end.low], -np.inf), axis=0)
     high = np.min(np.where(evaluated, [begin.high, middle.high, end.high], np.inf), axis=0)
-    return low, high, evaluated.any(axis=0)
+    return low, high, np.asarray(evaluated.any(axis=0))
 
 
 def _is_apart(curve: Curve, reach: float) -> bool:
