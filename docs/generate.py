@@ -26,7 +26,7 @@ from cosim.evaluation.metrics import phase_metrics
 from cosim.expectations.registry import EXPECTATIONS
 from cosim.fmu_filter.settings import FilterTable
 from cosim.report.figures.main_picture import main_picture
-from cosim.scenario import network_table, schema
+from cosim.scenario import campaign_table, network_table, schema
 from cosim.scenario import scenario_tables as tables
 from cosim.scenario.model_name import ModelName
 from fmu_observer.certificates.gap_findings import CONSTANT_GAP
@@ -206,6 +206,9 @@ def schema_tables() -> dict[str, Any]:
         "balises": tables.BalisesTable,
         "false_telegram": tables.FalseTelegramTable,
         "network": network_table.NetworkTable,
+        "campaign": campaign_table.CampaignTable,
+        "variable": campaign_table.VariedTable,
+        "keep": campaign_table.KeepTable,
         "report": tables.ReportTable,
         "phase": tables.PhaseTable,
         "measure": tables.MeasureTable,

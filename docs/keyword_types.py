@@ -12,6 +12,7 @@ from pydantic import BaseModel, BeforeValidator
 
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.registry import shipped_expectations
+from cosim.scenario.campaign_table import CampaignTable
 from cosim.scenario.model_name import ModelName
 from cosim.scenario.network_table import NetworkTable
 from cosim.scenario.paths import BALISE_PATHS, COMPONENT_PATHS, NETWORK_PATHS
@@ -27,6 +28,7 @@ TABLES: tuple[type[BaseModel], ...] = (
     NetworkTable,
     MasterTable,
     ReportTable,
+    CampaignTable,
 )
 LEFT_OUT: dict[Any, tuple[str, ...]] = {ConnectionTable: ("source", "target")}
 """Keys that `Scenario.connect` takes in another way."""

@@ -50,6 +50,13 @@ class RunnableScenario(Protocol):
     def table(self) -> ScenarioTable:
         """The validated scenario."""
 
+    def save(self, path: Path) -> Path:
+        """Write a scenario file that runs identically.
+
+        Args:
+            path: of the file.
+        """
+
     def run(
         self,
         *,

@@ -13,7 +13,7 @@ from cosim.scenario.scenario_tables import ComponentTable, ConnectionTable
 from cosim.scenario.toml_values import plain
 from cosim.toml_table import TomlTable
 
-TABLES = ("balises", "network", "master", "report")
+TABLES = ("balises", "network", "master", "report", "campaign")
 COMPONENT_KEYS = {field.alias or name for name, field in ComponentTable.model_fields.items()}
 INNER = ("options", "parameters")
 CASE = "case"

@@ -27,6 +27,7 @@ from pydantic import (
 from cosim.errors import ScenarioError, nearest
 from cosim.expectations.expectation import Expectation
 from cosim.expectations.registry import EXPECTATIONS
+from cosim.scenario.campaign_table import CampaignTable
 from cosim.scenario.network_table import NetworkTable
 from cosim.scenario.scenario_tables import (
     LINE,
@@ -90,6 +91,7 @@ class ScenarioTable(TomlTable):
     master: MasterTable = MasterTable()
     report: ReportTable = ReportTable()
     cases: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    campaign: CampaignTable | None = None
     expect: list[_ExpectationItem] = Field(default_factory=list)
 
     @model_validator(mode="after")

@@ -205,6 +205,41 @@ class ReportKeywords(TypedDict, total=False):
     tables: Sequence[str]
     si: bool
 
+class VariedKeywords(TypedDict, total=False):
+    """What one setting is drawn from."""
+
+    uniform: tuple[float, float] | None
+    log: tuple[float, float] | None
+    whole: tuple[int, int] | None
+    normal: tuple[float, float] | None
+    low: float | None
+    high: float | None
+    triangular: tuple[float, float, float] | None
+    choose: Sequence[Any] | None
+    weights: Sequence[float] | np.ndarray | None
+    unit: str | None
+
+class KeepKeywords(TypedDict, total=False):
+    """Runs whose whole results are kept beside the table."""
+
+    failures: int
+    worst: int
+    of: Sequence[str]
+    sample: int
+
+class CampaignKeywords(TypedDict, total=False):
+    """Many runs of the scenario: what varies, how points are laid, what is kept."""
+
+    runs: int | None
+    method: Literal["random", "latin", "sobol", "grid", "zip"]
+    seed: int
+    vary: Mapping[str, Sequence[Any] | VariedKeywords]
+    faults: bool | Sequence[str]
+    correlate: Sequence[tuple[str, str, float]]
+    where: Sequence[str]
+    design: Mapping[str, Sequence[Any]]
+    keep: KeepKeywords
+
 class ScenarioKeywords(TypedDict, total=False):
     """A whole scenario."""
 
@@ -224,6 +259,7 @@ class ScenarioKeywords(TypedDict, total=False):
     master: MasterKeywords
     report: ReportKeywords
     cases: Mapping[str, Mapping[str, Any]]
+    campaign: CampaignKeywords | None
     expect: Sequence[Mapping[str, Any]]
 
 class ConnectionKeywords(TypedDict, total=False):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
+from cosim import campaign as campaigns
 from cosim import ssp, studies
 from cosim.errors import CosimError
 from cosim.process.last_call import LAST_CALL
@@ -17,6 +18,7 @@ from cosim.run.scenario_structure import scenario_structure
 from cosim.run.streaming import ending, where_to
 from cosim.run.task import RunTask
 from cosim.runs.run_apart import run_apart, where_it_runs
+from cosim.scenario.campaign_table import CampaignTable
 from cosim.scenario.fmu_alone import FmuAlone, tables_of_fmu
 from cosim.scenario.includes import find_file, read_tables
 from cosim.scenario.origin import Origin
@@ -24,6 +26,7 @@ from cosim.scenario.package_names import is_package, stem
 from cosim.scenario.saving import save_scenario, scenario_text
 from cosim.scenario.scenario_tables import Isolate
 from cosim.scenario.shipped import shipped_scenarios
+from cosim.simulation.checked_call import keywords_of
 from cosim.simulation.results_of_others import demand_trust, is_of_results
 from cosim.simulation.scenario_screen import scenario_screen
 from cosim.simulation.stated_scenario import StatedScenario
@@ -33,7 +36,9 @@ from fmus.tables.table import FirstScreen, Parts
 from plant_models.code_trust import is_looking, looking
 
 if TYPE_CHECKING:
+    from cosim.campaign.campaign import Campaign
     from cosim.components.recording_data import Interpolation
+    from cosim.simulation import keywords
     from cosim.studies.distributions import Distribution
     from cosim.studies.sampling_plans import Mode
     from cosim.studies.sweep import Sweep
@@ -235,6 +240,22 @@ class Scenario(StatedScenario, FirstScreen):
         """
         sweep: Sweep = studies.make_sweep(self, values, mode, count, seed)
         return sweep
+
+    @keywords_of(CampaignTable)
+    def campaign(self, **table: Unpack[keywords.CampaignKeywords]) -> Campaign:
+        """The many runs that the table ``[campaign]`` asks for, ready to run.
+
+        ::
+
+            campaign = s.campaign(runs=1000, vary={"seed": {"whole": [0, 99999]}, "train.mass": {"normal": [8e4, 4e3]}})
+            result = campaign.run("results/night", workers=4)
+
+        Raises:
+            CosimError: there is no campaign, or something in it cannot be.
+        """
+        scenario = self.with_settings({f"campaign.{key}": value for key, value in table.items()})
+        made: Campaign = campaigns.make_campaign(scenario)
+        return made
 
     def run(
         self,

@@ -124,7 +124,9 @@ def _table(result: SweepRuns) -> Table:
     shown = result.shown()
     numbers = {name for name in result.names if all(is_number(run.settings.get(name)) for run in result.runs)}
     columns = [
-        Column(c.key, c.heading, setting_unit(result, c.key) or "", write=setting_text) if c.key in numbers else c
+        Column(c.key, c.heading, setting_unit(result.scenario, c.key) or "", write=setting_text)
+        if c.key in numbers
+        else c
         for c in shown.columns
     ]
     return replace(shown, columns=columns)
@@ -248,4 +250,4 @@ def _line(result: SweepRuns, against: str, label: str, runs: Sequence[SweepRun])
         values = np.array([run.measures.get(column.key, np.nan) for run in ordered])
         curves.append(PageCurve(column.heading, column.factor * values, column.unit or "1"))
     x = np.array([float(run.settings[against]) for run in ordered])
-    return PageRecording(label, x, curves, against, setting_unit(result, against) or "1")
+    return PageRecording(label, x, curves, against, setting_unit(result.scenario, against) or "1")

@@ -40,7 +40,7 @@ def variations(
         raise ScenarioError(f"vary: mode {mode!r} is none of {', '.join(map(repr, get_args(Mode)))}.")
     if not values:
         raise ScenarioError("vary: nothing is varied; expected for instance {'plant.mass': [70e3, 80e3]}.")
-    if mode not in ("grid", "zip"):
+    if mode != "grid" and mode != "zip":  # noqa: PLR1714 # so that type checkers follow
         return _sampled({name: drawn_from(name, stated) for name, stated in values.items()}, mode, count, seed)
     if count is not None:
         raise ScenarioError(f"vary: 'count' belongs to mode 'latin', 'random' or 'sobol', not to {mode!r}.")

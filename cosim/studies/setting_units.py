@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from cosim.components.described import DescribedComponent
 from cosim.errors import CosimError
 from cosim.run.described_components import describe_component
+from cosim.runs.runnable import RunnableScenario
 from plant_models.hybrid.units import UnitError
-
-if TYPE_CHECKING:
-    from cosim.studies.sweep_runs import SweepRuns
 
 _SETTING_UNITS = {
     "start": "s",
@@ -31,20 +27,18 @@ _SETTING_UNITS = {
 }
 
 
-def setting_unit(result: SweepRuns, name: str) -> str | None:
+def setting_unit(scenario: RunnableScenario, name: str) -> str | None:
     """Unit of what is varied: of the parameter as its component declares it, or of a key; None where there is none.
 
     Args:
-        result: the runs. name: of the setting.
+        scenario: that has it. name: of the setting.
     """
     component, _, variable = name.partition(".")
-    table = result.scenario.table().components.get(component)
+    table = scenario.table().components.get(component)
     if table is None:
         return _SETTING_UNITS.get(name)
     try:
-        described: DescribedComponent = describe_component(
-            component, table, result.scenario.folder, result.scenario.where
-        )
+        described: DescribedComponent = describe_component(component, table, scenario.folder, scenario.where)
         return described.unit_name(variable if variable in described.variables else f"{variable}[1]")
     except (CosimError, KeyError, UnitError):
         return None

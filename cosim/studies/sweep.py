@@ -260,7 +260,7 @@ def make_sweep(
             varied.table()
             names = sweep.scenario.cases[settings[CASE]] if CASE in settings else ()
             if number == 0 or (CASE in settings and settings[CASE] not in cases):
-                _check_parameters(varied, [*names, *sweep.names])
+                check_parameters(varied, [*names, *sweep.names])
             cases.add(settings.get(CASE))
         except CosimError as error:
             changed = ", ".join(f"{name} = {value!r}" for name, value in settings.items())
@@ -269,8 +269,15 @@ def make_sweep(
     return sweep
 
 
-def _check_parameters(scenario: RunnableScenario, names: Iterable[str]) -> None:
-    """Parameters that are varied exist: found here, and not in every run."""
+def check_parameters(scenario: RunnableScenario, names: Iterable[str]) -> None:
+    """Parameters that are varied exist: found here, and not in every run.
+
+    Args:
+        scenario: with their values. names: of settings.
+
+    Raises:
+        CosimError: a component has no such parameter, or cannot be described.
+    """
     tables = scenario.table().components
     for name in dict.fromkeys(n.partition(".")[0] for n in names if n.partition(".")[0] in tables):
         table = tables[name]

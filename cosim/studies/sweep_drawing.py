@@ -50,7 +50,7 @@ def sweep_figure(result: SweepRuns, measure: str | None, against: str | None, ax
         style = style | {"linestyle": ""} if lone else style
         ax.plot(x, y, marker="o", markersize=4, label=label or None, **style)
     _set_ticks(ax, ticks, [run.settings.get(against) for run in result.runs])
-    ax.set_xlabel(with_unit(against, setting_unit(result, against)))
+    ax.set_xlabel(with_unit(against, setting_unit(result.scenario, against)))
     ax.set_ylabel(with_unit(measure, result.unit(measure)))
     if result.failed:
         ax.set_title(f"{len(result.failed)} of {len(result.runs)} runs failed", fontsize="medium", loc="left")

@@ -42,7 +42,10 @@ LOOKING = {
 }
 """Lines of all commands that look, by program and name; words in capitals are files of those below."""
 RUNNING = {
-    *(f"cosim {name}" for name in ("baseline", "calibrate", "choose", "linearise", "new", "rerun", "run", "sweep")),
+    *(
+        f"cosim {name}"
+        for name in ("baseline", "calibrate", "campaign", "choose", "linearise", "new", "rerun", "run", "sweep")
+    ),
     *("cosim falsify", "cosim tune", "fmus build", "fmus check", "fmus compile"),
 }
 FROM_FOLDERS = (

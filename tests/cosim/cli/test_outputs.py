@@ -40,6 +40,8 @@ LINES = {
         "baseline embed": "baseline embed FMUBASE.json LAG.fmu -o OUT.fmu",
         "baseline extract": "baseline extract HOLDS.fmu OUT.json",
         "calibrate": "calibrate running_resistance RESULTS --signals speed=locomotive.speed --set minimum_speed=0.1",
+        "campaign": "campaign MANY.toml --quiet --out OUT",
+        "campaign dry": "campaign MANY.toml --dry-run",
         "certify": "certify takagi_sugeno_cdo --no-simulation",
         "certify of a scenario": "certify TRAIN",
         "choose": "choose TRAIN --observers takagi_sugeno_cdo,multirate_cdo --seeds 1 --further 1 --out OUT",
@@ -102,6 +104,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     unmet = {"check": "signal", "signal": "locomotive.speed", "max": 0.001}
     scenario.copy().set("expect", [unmet]).save(folder / "UNMET.toml")
     scenario.copy().set("expect", [unmet | {"max": 40.0}]).save(folder / "MET.toml")
+    table = {"runs": 3, "vary": {"seed": {"whole": [0, 99]}}, "keep": {"worst": 0}}
+    scenario.with_settings({"campaign": table}).save(folder / "MANY.toml")
     scenario.set("locomotive.mass", 80e3).save(folder / "heavy.toml")
     lag = linear_fmu(folder, "LAG", [[-1.0]], [[1.0]], [[1.0]], [[0.0]], version=2, x0=[1.0])
     with zipfile.ZipFile(shutil.copy(lag, folder / "BROKEN.fmu"), "a") as archive:

@@ -24,6 +24,7 @@ STEPPING = {
     "run": "run BAD --no-report --out OUT",
     "rerun": "rerun RESULTS --set boiler.from_when=0.29",
     "sweep": "sweep BAD --vary step=0.1,0.05 --out OUT",
+    "campaign": "campaign BAD --set campaign.method=zip --set campaign.vary.step=[0.1,0.05] --out OUT",
     "tune": "tune BAD --parameters boiler.gain=0.5:2 --cost rms(boiler.y) --iterations 1 --out OUT",
     "falsify": 'falsify BAD --vary boiler.gain=0.5..2 --set expect=[{{check="warnings"}}] --out OUT',
     "calibrate": "calibrate BAD RESULTS --parameters boiler.gain=1.5",

@@ -13,6 +13,7 @@ import pytest
 from cosim import Scenario, shipped_scenarios
 from cosim.errors import CosimError
 from cosim.expectations.registry import EXPECTATIONS
+from cosim.scenario.campaign_table import CampaignTable
 from cosim.scenario.network_table import NetworkTable
 from cosim.scenario.scenario_tables import BalisesTable, ComponentTable, ConnectionTable, MasterTable, ReportTable
 from cosim.scenario.schema import ScenarioTable
@@ -214,6 +215,7 @@ METHODS: dict[str, tuple[list[Any], set[str]]] = {
     "network": ([NetworkTable], set()),
     "master": ([MasterTable], set()),
     "report": ([ReportTable], set()),
+    "campaign": ([CampaignTable], set()),
     "expect": ([EXPECTATIONS[name] for name in EXPECTATIONS], {"check"}),
 }
 OWN = {"self", "name", "lines", "check", "folder", "where"}
