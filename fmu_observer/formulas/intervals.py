@@ -25,13 +25,20 @@ class Interval(NamedTuple):
 
 
 def meet(a: Interval, b: Interval) -> Array:
-    """1 where two intervals have a common point, else 0."""
+    """1 where two intervals have a common point, else 0.
+
+    Args:
+        a, b: the two.
+    """
     return np.where(np.maximum(a.low, b.low) <= np.minimum(a.high, b.high), 1.0, 0.0)
 
 
 def intersection_or_hull(a: Interval, b: Interval) -> Interval:
     """What is common to two intervals; where nothing is, all that lies in or between them: one of them is wrong, and it
     is not known which.
+
+    Args:
+        a, b: the two.
     """
     common = meet(a, b) > 0.0
     return Interval(
@@ -65,7 +72,11 @@ def _later_largest(values: Array, place: int) -> Array:
 
 
 def chosen(choice: Array, a: Interval, b: Interval) -> Interval:
-    """The first where `choice` is above zero, else the second."""
+    """The first where a choice is above zero, else the second.
+
+    Args:
+        choice: 1 or 0. a: the first. b: the second.
+    """
     return Interval(np.where(choice > 0.0, a.low, b.low), np.where(choice > 0.0, a.high, b.high))
 
 
