@@ -30,6 +30,9 @@ from cosim.studies.sweep import make_sweep
 from cosim.tuning.parameters import present_value
 from fmus.cli.progress import Progress, Report, reported
 
+_DEEPER = 5
+"""Populations after the first that breaks something: what is broken by more needs fewer changes."""
+
 
 def falsify(
     scenario: Scenario,
@@ -49,8 +52,9 @@ def falsify(
     """Search for a run that breaks an expectation, and make it as small as it can be.
 
     The cost is the smallest `margin` of the expectations. The search is that of `RestartedSearch`, over the shares of
-    the distributions. Of what breaks an expectation, changes are left out as long as the same expectation stays broken,
-    and numbers brought towards what the scenario has.
+    the distributions. After the first run that breaks an expectation five populations follow, so that it is broken by
+    more; then changes are left out as long as the same expectation stays broken, and numbers brought towards what the
+    scenario has.
 
     Args:
         scenario: with expectations, all of them met as it is. values: names as for `Scenario.set`, each with a range or
@@ -153,8 +157,8 @@ def _search(
     the first that breaks one, from 1.
     """
     search = RestartedSearch(len(drawn), seed)
-    best, found, first = Margin(), {name: one.at(0.5) for name, one in drawn.items()}, None
-    while margins.done < margins.most and (worst or first is None):
+    best, found, first, deeper = Margin(), {name: one.at(0.5) for name, one in drawn.items()}, None, 0
+    while margins.done < margins.most and (worst or deeper <= _DEEPER):
         points = search.ask()
         before = margins.done
         settings = [{name: one.at(float(u)) for (name, one), u in zip(drawn.items(), p, strict=True)} for p in points]
@@ -163,6 +167,7 @@ def _search(
             first = number if first is None and margin.broken else first
             if margin.value < best.value:
                 best, found = margin, each
+        deeper += first is not None
         if len(values) < len(points):
             break
         search.tell(points, np.array([margin.value for margin in values]))
