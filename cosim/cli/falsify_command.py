@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from cosim.campaign.plan import campaign_variables
+from cosim.campaign.variables import VariedSettings
 from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
 from cosim.cli.scenarios import load_scenario
 from cosim.cli.sweep_command import varied_values
@@ -84,16 +86,21 @@ def execute(options: argparse.Namespace) -> Output:
     return Output(found.details(), found.to_data(), files, code=_MET, verdict=found.verdict)
 
 
-def _values(scenario: Scenario, options: argparse.Namespace) -> dict[str, Any]:
-    """What varies.
+def _values(scenario: Scenario, options: argparse.Namespace) -> dict[str, Any] | VariedSettings:
+    """What varies: as the options say, or else as the scenario's campaign does.
 
     Raises:
-        ScenarioError: nothing does.
+        CosimError: nothing does, or something in the campaign cannot be.
     """
     faults = fault_ranges(scenario) if options.faults else {}
     if options.faults and not faults:
         raise ScenarioError("--faults: the scenario has no fault; give it a component such as wheel_fault.")
     values = {**faults, **varied_values(options.vary)}
+    campaign = scenario.table().campaign
+    if not values and campaign is not None:
+        return campaign_variables(scenario, campaign)
     if not values:
-        raise ScenarioError("Nothing is varied: give --vary NAME=LOW..HIGH, or --faults for a scenario with faults.")
+        raise ScenarioError(
+            "Nothing is varied: give --vary NAME=LOW..HIGH, --faults for a scenario with faults, or a table [campaign]."
+        )
     return values

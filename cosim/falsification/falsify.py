@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.campaign.variables import VariedSettings
 from cosim.errors import ScenarioError
 from cosim.falsification.margins import Margin, expectations_of, margin_of
 from cosim.falsification.search import RestartedSearch
@@ -36,7 +37,7 @@ _DEEPER = 5
 
 def falsify(
     scenario: Scenario,
-    values: Mapping[str, Iterable[Any] | Distribution],
+    values: Mapping[str, Iterable[Any] | Distribution] | VariedSettings,
     *,
     expectation: int | None = None,
     runs: int = 200,
@@ -58,7 +59,7 @@ def falsify(
 
     Args:
         scenario: with expectations, all of them met as it is. values: names as for `Scenario.set`, each with a range or
-            the values it takes.
+            the values it takes; or what varies in a campaign, whose conditions every run meets that is judged.
         expectation: its number in the scenario, from 1; None for whichever is broken first.
         runs: of the search at most. worst: whether it goes on to the last of them, to what is broken most.
         seed: of the search. directory: of the journal; None for none. workers, scheduler: see `make_executor`.
@@ -71,17 +72,25 @@ def falsify(
         ScenarioError: there is nothing to break, or a name or a value cannot be; the scenario as it is breaks it, or
             cannot be run.
     """
-    if not values:
-        raise ScenarioError("Nothing is varied: name settings with ranges, such as {'balises.spacing': (200, 900)}.")
     _demand_expectation(scenario, expectation)
-    make_sweep(scenario, values, "latin", 1, seed)  # names and values can be
-    drawn = {name: drawn_from(name, stated) for name, stated in values.items()}
+    varied = values if isinstance(values, VariedSettings) else _varied(scenario, values, seed)
     if resume and directory is None:
         raise ScenarioError("A search is resumed from its folder: give directory=...")
     journal = None if directory is None else Journal(Path(directory), resume=resume, retry=retry)
-    apart = Run(scenario, {name: one.at(0.5) for name, one in drawn.items()}).apart
+    apart = Run(scenario, varied.settings(np.full(len(varied.drawn), 0.5))).apart
     with make_executor(workers, scheduler, apart=apart) as executor, reported(progress, "run") as report:
-        return _falsified(_Margins(scenario, executor, journal, expectation, runs, report), drawn, seed, worst)
+        nominal = {name: value for name in varied.drawn if isfinite(value := _present(scenario, name))}
+        return _falsified(
+            _Margins(scenario, varied, nominal, executor, journal, expectation, runs, report), seed, worst
+        )
+
+
+def _varied(scenario: Scenario, values: Mapping[str, Iterable[Any] | Distribution], seed: int) -> VariedSettings:
+    """Names and values that can be."""
+    if not values:
+        raise ScenarioError("Nothing is varied: name settings with ranges, such as {'balises.spacing': (200, 900)}.")
+    make_sweep(scenario, values, "latin", 1, seed)
+    return VariedSettings({name: drawn_from(name, stated) for name, stated in values.items()})
 
 
 @dataclass
@@ -89,12 +98,15 @@ class _Margins:
     """Margins of settings, by runs.
 
     Args:
-        scenario: that is run. executor: where. journal: of the runs, or None. which: expectation, or None for all.
+        scenario: that is run. varied: what varies in it. nominal: what it has of that, of numbers. executor: where.
+        journal: of the runs, or None. which: expectation, or None for all.
         most: runs of the search. report: of progress, or None. done: runs of the search so far. shrinking: others.
         failures: how many runs ended early, by reason.
     """
 
     scenario: Scenario
+    varied: VariedSettings
+    nominal: Mapping[str, float]
     executor: Executor
     journal: Journal | None
     which: int | None
@@ -105,12 +117,15 @@ class _Margins:
     failures: Counter[str] = field(default_factory=Counter)
 
     def of(self, settings: Sequence[Mapping[str, Any]], *, searching: bool) -> list[Margin]:
-        """The margin with each of some settings, in their order; infinite of a run that ended early."""
+        """The margin with each of some settings, in their order; infinite of a run that ended early, and without a run
+        where they do not meet a condition.
+        """
         rests_on = code_content(expectations_of)
-        jobs = [Run(self.scenario, each, expectations_of, rests_on) for each in settings]
-        found = [Margin()] * len(jobs)
+        found, places = [Margin()] * len(settings), [n for n, each in enumerate(settings) if self._may_be(each)]
+        jobs = [Run(self.scenario, settings[place], expectations_of, rests_on) for place in places]
+        self.done += (len(settings) - len(places)) * searching  # so that a search ends where nothing may be
         for done in run_jobs(jobs, self.executor, self.journal):
-            found[done.number] = margin_of(done.row, self.which)
+            found[places[done.number]] = margin_of(done.row, self.which)
             self.failures.update([] if done.failure is None else [done.failure.reason])
             self.done += searching
             self.shrinking += not searching
@@ -118,26 +133,31 @@ class _Margins:
                 self.report(min(self.done, self.most), self.most)
         return found
 
+    def _may_be(self, settings: Mapping[str, Any]) -> bool:
+        """Whether settings meet the conditions, the rest as the scenario has it; without any change they may."""
+        whole = {**self.nominal, **settings}
+        known = settings and len(whole) == len(self.varied.drawn)
+        return not known or self.varied.unmet(whole) is None
+
     def broken(self, settings: Sequence[Mapping[str, Any]]) -> list[bool]:
         """Whether the expectation is broken with each of some settings."""
         return [margin.broken for margin in self.of(settings, searching=False)]
 
 
-def _falsified(margins: _Margins, drawn: Mapping[str, Distribution], seed: int, worst: bool) -> Falsification:
+def _falsified(margins: _Margins, seed: int, worst: bool) -> Falsification:
     as_it_is = margins.of([{}], searching=False)[0]
     _demand_met(as_it_is, margins)
     margins.shrinking = 0
-    found, best, first = _search(margins, drawn, seed, worst)
-    nominal = {name: value for name in drawn if isfinite(value := _present(margins.scenario, name))}
+    found, best, first = _search(margins, seed, worst)
     smallest: dict[str, Any] = {}
     margin = best
     if best.broken and best.evaluated is not None:
         margins.which = best.evaluated.number  # the same one stays broken
-        smallest = nearest(fewest(found, margins.broken), nominal, margins.broken)
+        smallest = nearest(fewest(found, margins.broken), margins.nominal, margins.broken)
         margin = margins.of([smallest], searching=False)[0]
     return Falsification(
         scenario=margins.scenario,
-        nominal=nominal,
+        nominal=margins.nominal,
         as_it_is=as_it_is,
         worst=best,
         found=found,
@@ -150,18 +170,17 @@ def _falsified(margins: _Margins, drawn: Mapping[str, Distribution], seed: int, 
     )
 
 
-def _search(
-    margins: _Margins, drawn: Mapping[str, Distribution], seed: int, worst: bool
-) -> tuple[dict[str, Any], Margin, int | None]:
+def _search(margins: _Margins, seed: int, worst: bool) -> tuple[dict[str, Any], Margin, int | None]:
     """Settings of the run that is nearest to breaking an expectation or breaks it most, its margin, and the number of
     the first that breaks one, from 1.
     """
-    search = RestartedSearch(len(drawn), seed)
-    best, found, first, deeper = Margin(), {name: one.at(0.5) for name, one in drawn.items()}, None, 0
+    varied, dimension = margins.varied, len(margins.varied.drawn)
+    search, best, first, deeper = RestartedSearch(dimension, seed), Margin(), None, 0
+    found = varied.settings(np.full(dimension, 0.5))
     while margins.done < margins.most and (worst or deeper <= _DEEPER):
         points = search.ask()
         before = margins.done
-        settings = [{name: one.at(float(u)) for (name, one), u in zip(drawn.items(), p, strict=True)} for p in points]
+        settings = [varied.settings(point) for point in points]
         values = margins.of(settings[: margins.most - before], searching=True)
         for number, (margin, each) in enumerate(zip(values, settings, strict=False), start=before + 1):
             first = number if first is None and margin.broken else first

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim import Scenario
+from cosim.campaign.plan import campaign_variables
 from cosim.cli import main
 from cosim.errors import CosimError
 from cosim.falsification.falsify import falsify
 from cosim.falsification.search import RestartedSearch
 from cosim.falsification.smallest import fewest, nearest
 from cosim.runs.journal import JOURNAL
+from cosim.scenario.campaign_table import CampaignTable
 from cosim.studies.distributions import uniform
 
 WEAK = 0.004
@@ -130,6 +133,23 @@ def test_workers_and_resume_change_nothing(tmp_path: Path) -> None:
     two = falsify(braked(), RANGES, workers=2, **options)
     assert first.to_data() == again.to_data() == two.to_data()
     assert first.searched == 30
+
+
+def test_a_campaign_says_what_varies_and_its_conditions_hold_in_what_is_found() -> None:
+    """Without the condition the strongest brake alone is what is left; with it a light train must be taken along."""
+    table = CampaignTable(
+        runs=1,
+        vary={"train.effort": {"uniform": (-4e5, 9e4)}, "train.mass": {"uniform": (80.0, 100.0), "unit": "t"}},
+        where=["train.effort > -1000 * (95000 - train.mass)"],
+    )
+    scenario = braked()
+    varied = campaign_variables(scenario, table)
+    found = falsify(scenario, varied, runs=60, seed=1, progress=False)
+    assert varied.unmet({"train.mass": 90e3, **found.found}) is None
+    assert varied.unmet({"train.mass": 90e3, "train.effort": 5e4, **found.smallest}) is None
+    never = replace(varied, where=["train.mass < 0"])
+    none = falsify(scenario, never, runs=12, progress=False)
+    assert (none.searched, none.broken) == (12, False)
 
 
 def test_nothing_found_is_no_proof() -> None:
