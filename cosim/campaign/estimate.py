@@ -46,7 +46,7 @@ class CampaignEstimate:
         return asdict(self)
 
 
-def estimate(campaign: Campaign) -> CampaignEstimate:
+def estimated(campaign: Campaign) -> CampaignEstimate:
     """Measure a few runs of a campaign, the first of which only warms caches.
 
     Args:

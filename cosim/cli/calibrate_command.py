@@ -35,7 +35,7 @@ RUNNING_RESISTANCE = "running_resistance"
 _RUN_SECONDS, _RUN_STEP = 60.0, 0.05
 
 GROUP = "Study"
-PLACE = 3
+PLACE = 4
 HELP = "fit parameters of an FMU, a train model or a scenario to a recording"
 LOOKS = False
 FORMER = {

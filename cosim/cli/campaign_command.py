@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from cosim.campaign.campaign import Campaign, make_campaign
-from cosim.campaign.estimate import estimate
+from cosim.campaign.estimate import estimated
 from cosim.cli.arguments import MANY_RUNS, QUIET, many_runs, positive, scenario_arguments
 from cosim.cli.scenarios import load_scenario
 from cosim.errors import ScenarioError
@@ -51,7 +51,7 @@ def execute(options: argparse.Namespace) -> Output:
     """Run, as the options ask."""
     campaign = _campaign(options)
     if options.dry_run:
-        found = estimate(campaign)
+        found = estimated(campaign)
         return Output(campaign.first_screen(), found.to_data(), verdict=found.text(options.workers))
     if len(campaign) > _LIMIT and not options.yes:
         raise ScenarioError(f"{len(campaign)} runs are more than {_LIMIT}: see --dry-run, and confirm with --yes.")

@@ -23,7 +23,7 @@ from fmus.cli.progress import ProgressBar
 _MET, _BROKEN = 0, 1
 
 GROUP = "Study"
-PLACE = 4
+PLACE = 5
 HELP = "search for a run that breaks an expectation"
 LOOKS = False
 EXAMPLES = (

@@ -41,7 +41,7 @@ def _seeds(text: str) -> list[int]:
 
 
 GROUP = "Study"
-PLACE = 2
+PLACE = 3
 HELP = "search parameters for the smallest cost over several seeds"
 LOOKS = False
 FORMER_OPTIONS = {"--judge": "--validate"}

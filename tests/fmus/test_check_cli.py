@@ -27,7 +27,7 @@ def test_the_table_of_an_honest_fmu(honest: Path, capsys: Output) -> None:
     rows = {line.split("  ")[0]: line for line in shown.out.splitlines() if "  pass" in line}
     assert "2e-06" not in rows["time per step"]
     assert "microseconds for a step of 0.01 s" in rows["time per step"]
-    assert "Verdict: use as it is (41 pass, " in shown.out
+    assert "Verdict: use as it is (42 pass, " in shown.out
     assert "  - Rollback: yes. " in shown.out
     assert "Traceback" not in shown.err
 

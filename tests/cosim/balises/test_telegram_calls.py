@@ -18,7 +18,7 @@ def telegrams(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return importlib.import_module("telegrams")
 
 
-MOST = 450
+MOST = 480
 
 
 @pytest.mark.parametrize("latency", [0.0, 0.25], ids=["on time", "late, replayed"])
