@@ -109,7 +109,9 @@ class Campaign(FirstScreen):
                     if rows := chunk.store.known(chunk.number):
                         chunk.store.commit(chunk.number, list(rows.values()))
             result = CampaignResult.read(folder, self.table, self.names, missing)
-            return keep_results(result, self, executor)
+            return keep_results(
+                result, self.scenario, {run.planned.number: run.planned.settings for run in self.runs}, executor
+            )
 
     def _opened(self, folder: Path, resume: bool) -> Store:
         """The store of this campaign in a folder."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from cosim.campaign.again import run_again
 from cosim.campaign.campaign import SCENARIO, make_campaign
 from cosim.campaign.campaign_result import CampaignResult
-from cosim.campaign.kept import run_again
 from cosim.cli.arguments import QUIET, settings_argument
 from cosim.cli.output import ignore, print_notice
 from cosim.cli.scenarios import parse_setting, simulated_time_bar

@@ -64,6 +64,7 @@ EXCEPT: Mapping[str, str] = {
     "sugeno_repaired": "gains for balises every half second",
     "multirate": "gains for balises every half second",
     "differentiator": "gains for balises every half second",
+    "interval_odometry": "its middle lies between all that is possible, as far for the wheel that creeps as for none",
 }
 """Observers that cannot be as good as their odometer by what they are, with the reason."""
 NOT_HERE: Mapping[str, str] = {

@@ -48,7 +48,7 @@ def main() -> None:
             sheet.add(f"{case}: {QUANTITIES[i]}", UNITS[i], published[i], factor * spread.value, why)
         for i, colour in ((4, "tab:orange"), (5, "tab:blue")):
             measure, factor = list(COLUMNS.values())[i]
-            axis.bar(k + 0.4 * (i - 4.5), factor * found[case][measure].mean, 0.38, color=colour)
+            axis.bar(k + 0.4 * (i - 4.5), factor * found[case][measure].value, 0.38, color=colour)
             if published[i] is not None:
                 axis.plot(k + 0.4 * (i - 4.5), published[i], "kx")
     axis.set_xticks(range(len(PUBLISHED)), list(PUBLISHED), rotation=45, ha="right")

@@ -18,9 +18,9 @@ from small_scenarios import small
 from test_fmus.events import DEEDS, hostile_fmu
 
 from cosim import Scenario, load_result
+from cosim.campaign.again import run_again
 from cosim.campaign.campaign import make_campaign
 from cosim.campaign.campaign_result import CampaignResult
-from cosim.campaign.kept import run_again
 from cosim.campaign.plan import planned_runs
 from cosim.campaign.store import PARTS, read_rows
 from cosim.errors import CosimError, OutputError, ScenarioError

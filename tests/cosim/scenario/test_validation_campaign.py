@@ -41,7 +41,7 @@ def test_without_jams_there_are_no_alarms_in_braking_or_before() -> None:
     cases = list(scenario.cases)
     variations = {"case": cases, "wheel.jam_rate": [0.0], "report.evaluate_after": [6.0]}
     found = grouped(scenario.vary(variations).run(keep=False), "case")
-    alarms = {case: found[case]["quasi_lpv_uio.false_alarms"].mean for case in cases}
+    alarms = {case: found[case]["quasi_lpv_uio.false_alarms"].value for case in cases}
     assert alarms == dict.fromkeys(cases, 0.0)
 
 
@@ -49,9 +49,9 @@ def test_the_observer_knows_its_position_better_than_the_odometer_in_jams() -> N
     """Over three drawings and the deepest jams: by half at least."""
     sweep = Scenario.load("validation_campaign").vary({"case": ["HS EBA", "AS EBA"], "seed": range(3)})
     for spreads in grouped(sweep.run(keep=False), "case").values():
-        ours, sensor = (spreads[f"{name}.balise_error_max"].mean for name in ("quasi_lpv_uio", "odometer_reset"))
+        ours, sensor = (spreads[f"{name}.balise_error_max"].value for name in ("quasi_lpv_uio", "odometer_reset"))
         assert ours < 0.5 * sensor
-        assert spreads["quasi_lpv_uio.missed_share"].mean < 0.15
+        assert spreads["quasi_lpv_uio.missed_share"].value < 0.15
 
 
 def test_every_miss_and_every_false_detection_has_a_cause(study: ModuleType) -> None:
