@@ -95,7 +95,11 @@ def test_a_train_stands_for_ten_minutes_and_departs() -> None:
     found = runner.outputs()
     assert found == {**stopped, "odometer_possible": 1.0}
     assert found["max_speed"] == found["min_speed"] == 0.0
-    runner.set("u", {"odometer": 1.0, "effort": 1e5})
+    runner.set("u", {"effort": 1e5})
+    runner.runtime.advance(640.1)  # it departs before the next reading
+    possible = (1e5 - 2e3) / 90e3 * 0.1  # less than 2 kN of resistance
+    assert runner.outputs()["min_speed"] <= 0.0 < possible < runner.outputs()["max_speed"]
+    runner.set("u", {"odometer": 1.0})
     runner.runtime.advance(650.0)
     found = runner.outputs()
     late = 0.5 * 1e5 * 1.03 / (90e3 * 0.97)  # the third best of the readings is .4 s old, the next one .2 s away

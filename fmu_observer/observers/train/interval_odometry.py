@@ -103,6 +103,8 @@ class IntervalOdometry(GatedObserver, GapCertified):
         memory("readings_possible", "1", 0.0, "1 where the reading was possible", size=WINDOW),
         memory("impossible_for", "s", 0.0, "Time without a reading that is possible"),
         memory("standing_for", "s", 0.0, "Time for which readings showed no motion"),
+        memory("standing_place", "m", 0.0, "Position at the last reading"),
+        memory("standing_half", "m", 0.0, "Half-width of its interval then"),
         memory("begun", "1", 0.0, "1 after the first reading"),
         memory("last_broken", "1", 0.0, "Assumption that was found broken last"),
         memory("times_broken", "1", 0.0, "How often one was"),
@@ -166,11 +168,10 @@ class IntervalOdometry(GatedObserver, GapCertified):
         ends = possible_accelerations(low, high, force, p)
         # of what a reading becomes, whichever of the speeds is the true one
         fast, slow = possible_accelerations(high, high, force, p), possible_accelerations(low, low, force, p)
-        speeds, moving = _speeds(x, p), 1.0 - _stands(x, p)
-        begun = x.begun * moving
+        speeds, begun = _speeds(x, p), x.begun
         return {
-            POSITION.name: 0.5 * (speeds.low + speeds.high) * moving,
-            "position_half": (0.5 * (speeds.high - speeds.low) + _MARGIN) * moving,
+            POSITION.name: 0.5 * (speeds.low + speeds.high),
+            "position_half": 0.5 * (speeds.high - speeds.low) + _MARGIN,
             "speed_low": begun * (ends.low - _MARGIN),
             "speed_high": begun * (ends.high + _MARGIN),
             "least_change": np.minimum(fast.low, slow.low) - _MARGIN,
@@ -193,10 +194,12 @@ class IntervalOdometry(GatedObserver, GapCertified):
         group = Interval(u.balise_position - error, u.balise_position + error)
         before = _places(x, p)
         after, broke = intersection_or_hull(before, group), 1.0 - meet(before, group)
-        middle = 0.5 * (after.low + after.high)
+        middle, half = 0.5 * (after.low + after.high), 0.5 * (after.high - after.low) - _start_error(x, p)
         return {
             POSITION.name: middle,
-            "position_half": 0.5 * (after.high - after.low) - _start_error(x, p),
+            "position_half": half,
+            "standing_place": middle,
+            "standing_half": half,
             "last_innovation": x.estimated_position - u.balise_position,
             **_broken(x, broke, GROUP_BROKE),
         }
@@ -219,10 +222,11 @@ class IntervalOdometry(GatedObserver, GapCertified):
         standing = np.where(
             np.abs(u.odometer) <= p.standstill_reading, possible * (x.standing_for + p.odometer_period), 0.0
         )
-        departs = _stands(x, p) * np.where(standing > 0.0, 0.0, 1.0)
         stays = np.where(standing > (WINDOW - 0.5) * p.odometer_period, 1.0, 0.0)
-        moved = Interval(np.minimum(means.low, 0.0), np.maximum(means.high, 0.0))  # since the reading before
-        after = chosen(stays, Interval(0.0, 0.0), chosen(departs, moved, found))
+        after = chosen(stays, Interval(0.0, 0.0), found)
+        stood = stays * _stands(x, p)  # since the reading before, so that nothing of the way between is true
+        place = np.where(stood > 0.0, x.standing_place, x.estimated_position)
+        half = np.where(stood > 0.0, x.standing_half, x.position_half + (1.0 - x.begun) * p.start_position_error)
         return {
             "speed_low": after.low,
             "speed_high": after.high,
@@ -230,9 +234,10 @@ class IntervalOdometry(GatedObserver, GapCertified):
             "readings_high": highs,
             "readings_possible": flags,
             "impossible_for": np.where(broke > 0.0, 0.0, waited),
-            "position_half": x.position_half
-            + (1.0 - x.begun) * p.start_position_error
-            + departs * p.odometer_period * np.maximum(moved.high, -moved.low),
+            POSITION.name: place,
+            "position_half": half,
+            "standing_place": place,
+            "standing_half": half,
             "standing_for": standing,
             "begun": 1.0,
             **_broken(x, broke, ODOMETER_BROKE),
